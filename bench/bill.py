@@ -1,0 +1,87 @@
+"""What a route will cost before it is run: its declared work priced by one measured forward solve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+
+from bench.memory import available_bytes
+from bench.timing import seconds_of
+from problems.problem import Array, Offers, Problem
+from routes.model import Model
+from routes.newton import ForwardWork, State
+from routes.tally import Work
+
+REPEATS = 3  # the first call of anything is slow
+
+
+@dataclass(frozen=True)
+class Prices:
+    """Seconds of a forward solve, of a substitution with its factors, of a product with R_u; and its declared work."""
+
+    forward: float
+    solve: float
+    matvec: float
+    declared: ForwardWork
+
+    def seconds(self, work: Work) -> float:
+        """The bill; substitutions inside forward solves are already in their price."""
+        substitutions = work.solves + work.transposed_solves - work.newton_iterations
+        return work.forward_solves * self.forward + substitutions * self.solve + work.matvecs * self.matvec
+
+
+def prices(problem: Problem, p: Array) -> tuple[Prices, State | None]:
+    """Measure the prices at p, and give back the state solved on the way (None for a black box)."""
+    model = Model(problem)
+    if Offers.SOLVE not in problem.offers:
+        seconds = median(seconds_of(lambda: model.value(p))[0] for _ in range(REPEATS))
+        return Prices(seconds, 0.0, 0.0, ForwardWork(k=0)), None
+    solves = [seconds_of(lambda: model.solve(p)) for _ in range(REPEATS)]
+    state: State = solves[-1][1]
+    R_u = problem.tangent(state.u, p)
+    solve = median(seconds_of(lambda: state.factors.solve(state.u))[0] for _ in range(REPEATS))
+    matvec = median(seconds_of(lambda: R_u @ state.u)[0] for _ in range(REPEATS))
+    declared = ForwardWork(len(state.history) - 1, problem.linear, model.solver.rtol)
+    return Prices(median(seconds for seconds, _ in solves), solve, matvec, declared), state
+
+
+def too_dear(seconds: float, tape: int, work: Work, budget: float) -> str | None:
+    """Why a predicted bill is not paid, in a sentence; None if it is."""
+    if seconds > budget:
+        return f"predicted bill {duration(seconds)} ({summary(work)}) > --budget {budget:g} s; --budget inf forces it"
+    memory = available_bytes()
+    if budget != float("inf") and memory is not None and tape > memory:
+        return f"predicted tape {size(tape)} > {size(memory)} of memory at hand; --budget inf forces it"
+    return None
+
+
+LEGEND = "fwd forward solves, lin linearized solves, adj transposed solves, mv products with R_u"
+
+
+def summary(work: Work) -> str:
+    """The work a person compares, in the words of LEGEND."""
+    substitutions = work.solves - work.newton_iterations
+    parts = (
+        (work.forward_solves, "fwd"),
+        (substitutions, "lin"),
+        (work.transposed_solves, "adj"),
+        (work.matvecs, "mv"),
+    )
+    return " + ".join(f"{count if count < 1e6 else f'{count:.2g}'} {name}" for count, name in parts if count > 0)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as a person reads them."""
+    for unit, length in (("y", 365.25 * 86400), ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0), ("ms", 1e-3)):
+        if seconds >= length:
+            return f"{seconds / length:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} us"
+
+
+def size(count: float) -> str:
+    """Bytes as a person reads them."""
+    for unit in ("B", "KiB", "MiB", "GiB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1024
+    return f"{count:.3g} TiB"

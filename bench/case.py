@@ -1,0 +1,77 @@
+"""A case: one problem with its options, one route with its options, one point p."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from bench import options, registry, selector
+from problems.errors import InputError
+from problems.problem import Array, Problem
+from problems.tables import read_columns
+from routes.route import Route
+
+
+@dataclass(frozen=True)
+class ProblemSpec:
+    """A problem still to be built."""
+
+    name: str
+    options: dict[str, Any]
+    build: Any
+
+    def __call__(self) -> Problem:
+        problem: Problem = self.build(**self.options)
+        return problem
+
+
+@dataclass(frozen=True)
+class RouteSpec:
+    """A route with its options as given; data-dependent defaults are still open (None)."""
+
+    route: Route
+    options: dict[str, Any]
+
+
+def problems(selectors: Iterable[str]) -> list[ProblemSpec]:
+    """All problems that the selectors name, grids expanded. Raises InputError."""
+    return [ProblemSpec(name, opts, target) for name, opts, target in _specs("problem", selectors)]
+
+
+def routes(selectors: Iterable[str]) -> list[RouteSpec]:
+    """All routes that the selectors name, grids expanded. Raises InputError."""
+    specs = [RouteSpec(target, opts) for _, opts, target in _specs("route", selectors)]
+    for spec in specs:
+        spec.route.check(**spec.options)
+    return specs
+
+
+def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str, dict[str, Any], Any]]:
+    for text in selectors:
+        chosen = selector.parse(text)
+        if chosen.name == "all":
+            if chosen.grid:
+                raise InputError(f"selector '{text}' - 'all' takes no options; name the {kind} to set one")
+            names = [name for name, entry in registry.entries(kind).items() if entry.failure is None]
+        else:
+            names = [chosen.name]
+        for name in names:
+            target = registry.find(kind, name).load()
+            for given in chosen.expand():
+                yield name, options.resolve(registry.factory_of(target), given, name), target
+
+
+def point(problem: Problem, at: str) -> Array:
+    """p (n_p,) for `start`, `true` or a CSV file of one column. Raises InputError, DomainError."""
+    if at == "start":
+        return problem.parameters.start.copy()
+    if at == "true":
+        truth = problem.truth()
+        if truth is None:
+            raise InputError(f"{problem.name}: the true parameters are not known - use --at start or --at FILE.csv")
+        return truth
+    columns = read_columns(at, None)
+    if len(columns) != 1:
+        raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
+    return problem.parameters.check(next(iter(columns.values())), at)

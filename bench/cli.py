@@ -1,0 +1,193 @@
+"""The command line. Every verb calls a study and a view; nothing heavy is imported before it is needed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from problems.errors import DomainError, InputError
+
+if TYPE_CHECKING:
+    from bench.runner import Outcome
+
+WRONG_USAGE = 2
+STORE = Path("results") / "routes.sqlite"
+
+
+class Routes(click.Group):
+    """Turns errors into one line and an exit code; --debug lets the traceback through."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (InputError, DomainError) as error:
+            if "--debug" in sys.argv:
+                raise
+            click.echo(f"routes: {error}", err=True)
+            ctx.exit(WRONG_USAGE)
+
+
+@click.group(cls=Routes, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="gradient-routes", prog_name="routes")
+def main() -> None:
+    """Gradients of PDE-constrained objectives: every route to dJ/dp, what it costs and how wrong it is.
+
+    \b
+    routes list                                   what exists, with all options
+    routes run --problem bar --route adjoint      one gradient, its bill and its error
+    routes run --problem 'bar[n=8|64]' --route all
+    """
+
+
+store_option = click.option(
+    "--store", type=click.Path(path_type=Path), default=STORE, show_default=True, help="SQLite file that keeps results."
+)
+debug_option = click.option("--debug", is_flag=True, help="Show tracebacks.")
+
+
+@main.command("list")
+@click.argument("what", required=False, type=click.Choice(["problems", "routes"]))
+@debug_option
+def list_(what: str | None, debug: bool) -> None:
+    """What exists: problems, routes, their options with defaults, plug-ins that cannot be imported."""
+    from bench.views.listing import listing
+    from bench.views.tables import console
+
+    out = console()
+    if what != "routes":
+        out.print(listing("problem"))
+    if what != "problems":
+        out.print(listing("route"))
+
+
+SELECTOR = "NAME, NAME[key=value,key=a|b] or all; repeatable."
+AT = "The p to differentiate at; a file has a header line and n_p values in one column."
+BUDGET = "Skip what is predicted to take more seconds, or more memory than there is; inf forces it."
+
+
+@main.command()
+@click.option("--problem", "problems", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
+@click.option("--route", "routes", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
+@click.option("--at", default="start", show_default=True, metavar="start|true|FILE.csv", help=AT)
+@click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
+@click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
+@click.option("--gradient", is_flag=True, help="Show the gradient parameter by parameter beside its reference.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
+@store_option
+@click.option("--no-store", is_flag=True, help="Keep nothing.")
+@debug_option
+def run(
+    problems: tuple[str, ...],
+    routes: tuple[str, ...],
+    at: str,
+    budget: float,
+    min_time: float,
+    gradient: bool,
+    as_json: bool,
+    store: Path,
+    no_store: bool,
+    debug: bool,
+) -> None:
+    """Compute dJ/dp by every route named, on every problem named; say what it cost and how wrong it is.
+
+    Exit code: 0 all ok or skipped, 1 a case failed (its row says why), 2 wrong usage.
+    """
+    from bench import case
+    from bench.rows import as_json as json_line
+    from bench.runner import Settings
+    from bench.runner import run as run_cases
+    from bench.store import Store
+
+    if not budget > 0:
+        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
+    if not 0 <= min_time < float("inf"):
+        raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
+    problem_specs, route_specs = case.problems(problems), case.routes(routes)
+    outcomes = run_cases(problem_specs, route_specs, Settings(at, budget, min_time, gradient))
+    kept = None if no_store else Store(store)
+    if kept is not None:
+        kept.check_writable()
+    done: list[Outcome] = []
+    try:
+        for outcome in with_progress(outcomes, len(problem_specs) * len(route_specs)):
+            done.append(outcome)
+            if kept is not None:
+                kept.append(outcome.row, outcome.samples)
+            if as_json:
+                click.echo(json_line(outcome.row))
+    finally:  # an interrupt leaves what was measured on the screen, too
+        if not as_json:
+            show(done)
+    for outcome in done if debug else []:
+        click.echo(outcome.traceback or "", err=True, nl=False)
+    if any(outcome.row["status"] == "failed" for outcome in done):
+        sys.exit(1)
+
+
+def show(outcomes: list[Outcome]) -> None:
+    """The table, the reasons and notes below it, the gradients where they were asked for."""
+    from bench.views import tables
+
+    if not outcomes:
+        return
+    out = tables.console()
+    rows = [outcome.row for outcome in outcomes]
+    out.print(tables.results(rows))
+    for line in tables.remarks(rows):
+        out.print(line, soft_wrap=True)
+    for outcome in outcomes:
+        if outcome.view is not None:
+            out.print()
+            out.print(tables.gradient(outcome.row, outcome.view))
+
+
+def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
+    """A progress bar on a terminal for more than one case, nothing of the kind elsewhere."""
+    if count < 2 or not (sys.stderr.isatty() and sys.stdout.isatty()):
+        yield from outcomes
+        return
+    from rich.progress import track
+
+    from bench.views.tables import console
+
+    yield from track(outcomes, "cases", total=count, console=console(stderr=True), transient=True)
+
+
+@main.command()
+@click.option("--table", type=click.Choice(["cases", "samples", "environments"]), default="cases", show_default=True)
+@click.option("--format", "format", type=click.Choice(["csv", "parquet", "json"]), default="csv", show_default=True)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write [stdout].")
+@store_option
+@debug_option
+def export(table: str, format: str, output: Path | None, store: Path, debug: bool) -> None:
+    """Tables of the store as CSV, Parquet or JSON (one array of row objects)."""
+    from bench.export import export as write
+    from bench.store import Store
+
+    write(Store(store), table, format, output)
+
+
+@main.command()
+@store_option
+@debug_option
+def report(store: Path, debug: bool) -> None:
+    """The tables of everything the store holds."""
+    from bench.store import Store
+
+    show_stored(Store(store).rows())
+
+
+def show_stored(rows: list[dict[str, Any]]) -> None:
+    from bench.views import tables
+
+    out = tables.console()
+    out.print(tables.results(rows))
+    for line in tables.remarks(rows):
+        out.print(line, soft_wrap=True)
+
+
+__all__ = ["main"]

@@ -1,0 +1,85 @@
+"""What exists: problems and routes, built-in and from plug-ins, all by entry points, loaded when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Literal
+
+from bench.suggest import did_you_mean
+from problems.errors import InputError
+from routes.route import Route
+
+Kind = Literal["problem", "route"]
+BUILT_IN = "gradient-routes"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A registered name; `load` imports it, `failure` says why it cannot be imported (None if it can)."""
+
+    kind: Kind
+    point: EntryPoint
+
+    @property
+    def name(self) -> str:
+        return self.point.name
+
+    @property
+    def origin(self) -> str:
+        """The distribution that registered it."""
+        return self.point.dist.name if self.point.dist else "?"
+
+    def load(self) -> Any:
+        """The factory of a problem, or the Route. Raises InputError with the reason if that fails."""
+        try:
+            target = self.point.load()
+        except Exception as error:  # a plug-in may raise anything while it is imported
+            said = " ".join(str(error).split())
+            raise InputError(
+                f"{self.kind} '{self.name}' of {self.origin} cannot be imported: {type(error).__name__}: {said}"
+                f" - mend or uninstall {self.origin}"
+            ) from error
+        if self.kind == "route" and not isinstance(target, Route):
+            raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
+        return target
+
+    @property
+    def failure(self) -> str | None:
+        try:
+            self.load()
+        except InputError as error:
+            return str(error)
+        return None
+
+
+@cache
+def entries(kind: Kind) -> dict[str, Entry]:
+    """All registered entries of a kind, built-ins first; of two with one name, the built-in or first one counts."""
+    found = [Entry(kind, point) for point in entry_points(group=f"gradient_routes.{kind}s")]
+    order = {name: i for i, name in enumerate(ORDER)}
+    found.sort(key=lambda e: (e.origin != BUILT_IN, order.get(e.name, len(order)), e.name))
+    first: dict[str, Entry] = {}
+    for entry in found:
+        first.setdefault(entry.name, entry)
+    return first
+
+
+# the order of the story: from nothing but J to the whole structure
+ORDER = ("bar", "fd-one-sided", "fd-central", "complex-step", "tangent", "adjoint", "unrolled-ad", "implicit-ad")
+
+
+def find(kind: Kind, name: str) -> Entry:
+    """The entry of that name. Raises InputError with the nearest name."""
+    known = entries(kind)
+    if name not in known:
+        raise InputError(f"no {kind} '{name}' - {did_you_mean(name, known)}")
+    return known[name]
+
+
+def factory_of(target: Any) -> Callable[..., Any]:
+    """What declares the options: a route's function, or the problem's factory itself."""
+    function: Callable[..., Any] = target.function if isinstance(target, Route) else target
+    return function

@@ -1,0 +1,136 @@
+"""The schema of a result: every column of a row, with its type, its unit and its meaning."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from routes.tally import KINDS
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table `cases`. `type` is SQLite's; JSON columns hold text there and objects in --json."""
+
+    name: str
+    type: str
+    unit: str
+    meaning: str
+    json: bool = False
+
+
+COLUMNS = (
+    Column("problem", "TEXT", "", "name of the problem"),
+    Column("problem_options", "TEXT", "", "its options, defaults included", json=True),
+    Column("route", "TEXT", "", "name of the route"),
+    Column("route_options", "TEXT", "", "its options, as resolved for this case", json=True),
+    Column("at", "TEXT", "", "the p it was computed at: start, true or a file"),
+    Column("status", "TEXT", "", "ok, skipped or failed"),
+    Column("reason", "TEXT", "", "why it was skipped or failed"),
+    Column("note", "TEXT", "", "what should be read beside the numbers"),
+    Column("n_state", "INTEGER", "1", "n_u, free unknowns"),
+    Column("n_param", "INTEGER", "1", "n_p, parameters"),
+    Column("objective", "REAL", "problem's", "J(p)"),
+    Column("gradient", "TEXT", "problem's", "dJ/dp, where n_param <= 64 or asked for", json=True),
+    Column("gradient_norm", "REAL", "problem's", "|dJ/dp|_2"),
+    Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2"),
+    Column("reference", "TEXT", "", "where g_ref comes from"),
+    Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved by the forward solve"),
+    Column("prepare_s", "REAL", "s", "preparation: problem, imports, compilation"),
+    Column("first_s", "REAL", "s", "first call of the gradient"),
+    Column("seconds", "REAL", "s", "gradient, median of the steady calls"),
+    Column("seconds_min", "REAL", "s", "gradient, fastest steady call"),
+    Column("n_samples", "INTEGER", "1", "steady calls, each followed by a forward solve"),
+    Column("forward_s", "REAL", "s", "one forward solve, median over the same rounds"),
+    Column("forward_ratio", "REAL", "1", "seconds / forward_s"),
+    Column("peak_bytes", "INTEGER", "byte", "peak memory of one call above what was held before it"),
+    Column("memory_method", "TEXT", "", "how peak_bytes was measured"),
+    Column("tape_bytes", "INTEGER", "byte", "arrays AD holds between its forward and its backward sweep"),
+    Column("work", "TEXT", "1", "work counted during one call", json=True),
+    Column("predicted_work", "TEXT", "1", "work the route declares", json=True),
+    Column("predicted_s", "REAL", "s", "declared work priced by one measured forward solve"),
+    Column("predicted_tape_bytes", "REAL", "byte", "tape the route declares"),
+    Column("started", "TEXT", "UTC", "when the case began, ISO 8601"),
+)
+
+SAMPLES = (
+    Column("case_id", "INTEGER", "", "id of the row in cases"),
+    Column("kind", "TEXT", "", "gradient or forward"),
+    Column("round", "INTEGER", "1", "gradient and forward of one round are neighbours in time"),
+    Column("seconds", "REAL", "s", "one call"),
+)
+
+ENVIRONMENTS = (
+    Column("environment_id", "TEXT PRIMARY KEY", "", "fingerprint of the columns that follow"),
+    Column("cpu", "TEXT", "", "model of the processor"),
+    Column("cores", "INTEGER", "1", "cores of the machine"),
+    Column("usable_cores", "INTEGER", "1", "cores this process may use"),
+    Column("memory_bytes", "INTEGER", "byte", "memory of the machine"),
+    Column("os", "TEXT", "", "system, release, architecture"),
+    Column("python", "TEXT", "", "version of Python"),
+    Column("blas", "TEXT", "", "NumPy's BLAS and its version"),
+    Column("threads", "TEXT", "", "environment variables that set thread counts", json=True),
+    Column("versions", "TEXT", "", "versions of the numerical libraries", json=True),
+)
+
+WORK_PREFIX = {"work": "work", "predicted": "predicted_work"}  # of a stored column -> the object in a row
+WORK_COLUMNS = tuple(
+    Column(f"{prefix}_{kind}", "INTEGER", "1", f"{kind} {how}")
+    for prefix, how in zip(WORK_PREFIX, ("counted", "declared"), strict=True)
+    for kind in KINDS
+)
+STORED = tuple(c for c in COLUMNS if c.name not in ("work", "predicted_work")) + WORK_COLUMNS
+
+
+def empty_row() -> Row:
+    """A row with every column absent."""
+    return dict.fromkeys((c.name for c in COLUMNS), None)
+
+
+def absent_if_not_finite(value: Any) -> Any:
+    """JSON and SQL have no NaN: what is not a finite number is absent."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def storable(value: Any) -> Any:
+    """SQLite's integers end at 2^63; a predicted count may not."""
+    return float(value) if isinstance(value, int) and value >= 2**63 else absent_if_not_finite(value)
+
+
+def as_json(row: Row) -> str:
+    """One JSON object on one line."""
+    clean = {name: absent_if_not_finite(value) for name, value in row.items()}
+    return json.dumps(clean, allow_nan=False)
+
+
+def as_record(row: Row) -> tuple[Any, ...]:
+    """The values of STORED for the database: objects as JSON text, work spread over one column a kind."""
+    record = []
+    for column in STORED:
+        if column in WORK_COLUMNS:
+            prefix, _, kind = column.name.partition("_")
+            work = row[WORK_PREFIX[prefix]]
+            record.append(None if work is None else storable(work[kind]))
+        elif column.json:
+            value = row[column.name]
+            record.append(None if value is None else json.dumps(value, allow_nan=False))
+        else:
+            record.append(storable(row[column.name]))
+    return tuple(record)
+
+
+def from_record(record: dict[str, Any]) -> Row:
+    """The row that `as_record` wrote."""
+    row = empty_row()
+    for column in COLUMNS:
+        if column.name in record:
+            value = record[column.name]
+            row[column.name] = json.loads(value) if column.json and value is not None else value
+    for prefix, name in WORK_PREFIX.items():
+        work = {kind: record[f"{prefix}_{kind}"] for kind in KINDS}
+        row[name] = None if None in work.values() else work
+    return row

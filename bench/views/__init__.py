@@ -1,0 +1,1 @@
+"""What a person sees: tables built from rows, nothing measured here."""

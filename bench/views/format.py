@@ -1,0 +1,31 @@
+"""Numbers and options as a person reads them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bench.bill import duration, size
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    return "" if value is None else f"{value:.{digits}g}"
+
+
+def ratio(value: float | None) -> str:
+    """Three digits, never an exponent."""
+    return "" if value is None else f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def seconds(value: float | None) -> str:
+    return "" if value is None else duration(value)
+
+
+def bytes_(value: int | None) -> str:
+    return "" if value is None else size(value)
+
+
+def selector(name: str, options: dict[str, Any], defaults: dict[str, Any]) -> str:
+    """`name[key=value]` with what differs from the defaults."""
+    shown = [f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}" for key, value in options.items()
+             if value != defaults.get(key)]  # fmt: skip
+    return f"{name}[{','.join(shown)}]" if shown else name

@@ -1,0 +1,51 @@
+"""`routes list`: what exists, its options, what it offers or needs, and what cannot be imported."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Group
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from bench import registry
+from bench.options import options_of
+from bench.views.palette import route_style
+from problems.errors import InputError
+from problems.problem import offer_names
+from routes.route import Route
+
+
+def listing(kind: registry.Kind) -> Group:
+    """All problems or all routes, one block each."""
+    blocks: list[Any] = [Text(f"{kind}s", style="bold")]
+    for entry in registry.entries(kind).values():
+        blocks.append(Padding(_block(kind, entry), (0, 0, 1, 2), expand=False))
+    return Group(*blocks)
+
+
+def _block(kind: registry.Kind, entry: registry.Entry) -> Group:
+    origin = "" if entry.origin == registry.BUILT_IN else f"  (from {entry.origin})"
+    name = Text(entry.name + origin, style=f"bold {route_style(entry.name)}")
+    try:
+        target = entry.load()
+    except InputError as error:
+        return Group(name, Text(str(error), style="red"))
+    options = Table(box=None, pad_edge=False, show_header=False)
+    options.add_column(no_wrap=True)
+    options.add_column()
+    for option in options_of(registry.factory_of(target)).values():
+        options.add_row(Text(option.text), Text(option.help))
+    return Group(name, Text(_summary(target)), Text(f"{_contract(kind, target)}", style="dim"), options)
+
+
+def _summary(target: Any) -> str:
+    if isinstance(target, Route):
+        return target.summary
+    return " ".join((target.__doc__ or "").strip().split("\n\n")[0].split())
+
+
+def _contract(kind: registry.Kind, target: Any) -> str:
+    flags = target.needs if isinstance(target, Route) else target.offers
+    return f"{'needs' if kind == 'route' else 'offers'}: {', '.join(offer_names(flags))}"

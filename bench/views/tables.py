@@ -1,0 +1,142 @@
+"""Results as tables for a terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from bench import registry
+from bench.bill import LEGEND, summary
+from bench.options import options_of
+from bench.rows import Row
+from bench.runner import View
+from bench.views.format import bytes_, number, ratio, seconds, selector
+from bench.views.palette import route_style
+from problems.errors import InputError
+from routes.tally import Work
+
+PIPED_WIDTH = 160  # columns where there is no terminal to ask
+MANY = 64  # parameters; longer views show both ends
+
+
+def console(stderr: bool = False) -> Console:
+    """A console as wide as the terminal; wide where the output is piped, so that nothing is cut."""
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(stderr=stderr, width=None if stream.isatty() else PIPED_WIDTH, highlight=False, emoji=False)
+
+
+def results(rows: Sequence[Row]) -> Table:
+    """One line a case under the line of its problem: the bill, and how wrong the gradient is."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    several = len(references(rows)) > 1
+    table.add_column("problem\n  route", overflow="fold", min_width=14)
+    for name in ("n_u", "n_p", "J", "error", "time", "x fwd"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("work", overflow="fold")
+    for name in ("memory", "tape"):
+        table.add_column(name, justify="right")
+    if several:
+        table.add_column("error against", overflow="fold", min_width=7)
+    before = None
+    for row in rows:
+        problem = named("problem", row)
+        if problem != before:
+            table.add_row(Text(problem, style="bold"))
+            before = problem
+        cells = _cells(row) + ([Text(row["reference"] or "")] if several else [])
+        table.add_row(Text("  " + named("route", row), style=_style(row) or route_style(row["route"])), *cells)
+    return table
+
+
+def references(rows: Sequence[Row]) -> list[str]:
+    """What the errors were measured against, each once."""
+    return list(dict.fromkeys(row["reference"] for row in rows if row["reference"]))
+
+
+def _style(row: Row) -> str:
+    return {"ok": "", "skipped": "dim"}.get(row["status"], "bold red")
+
+
+def _cells(row: Row) -> list[Text]:
+    cells = [str(row["n_state"]), str(row["n_param"])]
+    if row["status"] == "ok":
+        cells += [
+            number(row["objective"], 4),
+            number(row["gradient_error"], 2) or "unknown",
+            seconds(row["seconds"]),
+            ratio(row["forward_ratio"]),
+            _work(row, "work"),
+            bytes_(row["peak_bytes"]),
+            bytes_(row["tape_bytes"]),
+        ]
+    else:
+        cells += [row["status"], "", "", "", _work(row, "predicted_work"), "", ""]
+    return [Text(cell, style=_style(row)) for cell in cells]
+
+
+def _work(row: Row, which: str) -> str:
+    return "" if row[which] is None else summary(Work(**row[which]))
+
+
+def named(kind: registry.Kind, row: Row) -> str:
+    """The selector of a row's problem or route, without its defaults."""
+    name, options = row[kind], row[f"{kind}_options"]
+    try:
+        factory = registry.factory_of(registry.find(kind, name).load())
+    except InputError:  # a stored row of a plug-in that is gone
+        return selector(name, options, {})
+    return selector(name, options, {n: o.default for n, o in options_of(factory).items()})
+
+
+def remarks(rows: Sequence[Row]) -> list[Text]:
+    """A legend, reasons of skipped and failed cases, then notes, each once."""
+    judges = references(rows)
+    against = f" against the {judges[0]}" if len(judges) == 1 else ""
+    legend = f"error: |g - g_ref| / |g_ref|{against}; x fwd: time in forward solves; work: {LEGEND}"
+    lines = {"": Text(legend, style="dim")}
+    for row in rows:
+        if row["status"] != "ok":
+            style = "dim" if row["status"] == "skipped" else "red"
+            reason = row["reason"]
+            head = "" if reason.startswith(row["route"]) else f"{row['route']}: "
+            lines.setdefault(reason, Text(f"{row['status']}: {head}{reason}", style=style))
+    for row in rows:
+        for note in (row["note"] or "").split("; "):
+            if note:
+                about = row["route"] if "apart" in note else row["problem"]
+                lines.setdefault(note, Text(f"note: {about}: {note}", style="italic"))
+    return list(lines.values())
+
+
+def gradient(row: Row, view: View) -> Table:
+    """Parameter by parameter: the route's gradient beside the reference and what the problem adds."""
+    title = f"{named('problem', row)} by {named('route', row)}"
+    table = Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="bold")
+    reference = view.reference
+    table.add_column("p", no_wrap=True)
+    table.add_column("dJ/dp", justify="right", style=route_style(row["route"]))
+    if reference is not None:
+        table.add_column(Text(reference.name), justify="right")
+    for name in view.columns.columns:
+        table.add_column(Text(name), justify="right", overflow="fold")
+    blind = view.columns.blind
+    if blind is not None:
+        table.add_column("")
+    n = len(view.labels)
+    shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
+    for i in shown:
+        if i is None:
+            table.add_row(f"... {n - MANY} more", style="dim")
+            continue
+        values: list[Any] = [view.gradient[i]]
+        values += [] if reference is None else [reference.gradient[i]]
+        values += [column[i] for column in view.columns.columns.values()]
+        mark = [] if blind is None else ["blind" if blind[i] else ""]
+        hidden = blind is not None and blind[i]
+        table.add_row(view.labels[i], *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
+    return table

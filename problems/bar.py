@@ -1,0 +1,186 @@
+"""The bar: N two-node elements in a row, fixed at x = 0, pulled at x = L, one modulus each.
+
+K(E) u = f,    k_e = E_e A / L_e [[1, -1], [-1, 1]],    f = F at node N,    K = B^T diag(E A / L_e) B
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from problems.chain import Chain, ElementForces, cumulative_sum, difference, divergence
+from problems.errors import InputError
+from problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Reference, Traced
+from problems.regularization import tikhonov, tikhonov_gradient
+from problems.sensors import Nodes, Sensors, measured, parse_nodes
+
+L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
+THETA_MAX = 300.0  # E = exp(theta) and the squares the gradient needs stay in float64's range
+
+
+def true_modulus(x: Array) -> Array:
+    """The modulus [Pa] behind synthetic data: a smooth field with a soft inclusion, half as stiff, at x = 0.35.
+
+    Nowhere near the start E = 1 at the clamp: sensors there would see a misfit that is all rounding.
+    """
+    return (1.3 + 0.2 * np.sin(2.0 * np.pi * x)) * (1.0 - 0.5 * np.exp(-(((x - 0.35) / 0.1) ** 2)))
+
+
+class Bar(Problem):
+    """A bar whose moduli are sought from displacements: the smallest problem with a blind spot.
+
+    State u (N,) [m], displacement of nodes 1..N; parameters theta = log E or E itself (N,), E in Pa.
+    Elements behind the last sensor carry load but move no sensor: their data gradient is exactly 0.
+    """
+
+    name = "bar"
+    offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
+    linear = True
+    structure = "spd"
+
+    def __init__(
+        self,
+        *,
+        n: Annotated[int, "number of elements N"] = 8,
+        sensors: Annotated[Nodes | None, "5: nodes 1..5; 1,3,5 or 2..6: these; 0: none [nodes 1..min(5, n)]"] = None,
+        parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
+        data: Annotated[str | None, "CSV file of measurements, columns node,displacement [synthetic]"] = None,
+        noise: Annotated[float, "standard deviation added to synthetic data [m]"] = 0.0,
+        seed: Annotated[int, "of that noise"] = 0,
+        alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
+    ) -> None:
+        if n < 1:
+            raise InputError(f"bar: n={n} elements - choose n >= 1")
+        if not (alpha >= 0 and math.isfinite(alpha)):
+            raise InputError(f"bar: alpha={alpha:g} - a weight is finite and >= 0")
+        if not (noise >= 0 and math.isfinite(noise)):
+            raise InputError(f"bar: noise={noise:g} - a standard deviation is finite and >= 0")
+        if seed < 0:
+            raise InputError(f"bar: seed={seed} - choose seed >= 0")
+        if data is not None and noise > 0:
+            raise InputError("bar: noise= is added to synthetic data only - drop it or drop data=")
+        self.n_state = n
+        self.log = parametrization == "log"
+        self.alpha = alpha
+        self.L_e = L / n
+        self.f = np.zeros(n)  # [N]
+        self.f[-1] = F
+        self.x = (np.arange(n) + 0.5) * self.L_e  # element centres [m]
+        self.synthetic = data is None
+        if data is not None:
+            self.sensors = measured(data, n, sensors, "bar")
+        else:
+            nodes = parse_nodes(min(5, n) if sensors is None else sensors, n, "bar")
+            d = cumulative_sum(F * self.L_e / (A * true_modulus(self.x)))[nodes - 1]
+            self.sensors = Sensors(nodes, d + noise * np.random.default_rng(seed).standard_normal(len(nodes)))
+        self.parameters = Parameters(
+            start=np.zeros(n) if self.log else np.ones(n),
+            scale=np.ones(n),
+            lower=-THETA_MAX if self.log else 0.0,
+            upper=THETA_MAX if self.log else np.inf,
+            unit="log Pa" if self.log else "Pa",
+            label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
+        )
+        self.last_sensor = int(self.sensors.nodes.max(initial=0))
+        self.notes = self._notes()
+
+    def _notes(self) -> tuple[str, ...]:
+        n_blind = self.n_state - self.last_sensor
+        if n_blind == self.n_state:
+            return ("no sensors: J has no data term, its data gradient is exactly 0",)
+        return (f"{n_blind} of {self.n_state} elements lie behind the last sensor: blind",) if n_blind else ()
+
+    def modulus(self, p: Any, xp: Any = np) -> Any:
+        """E(p), (N,) [Pa]."""
+        return xp.exp(p) if self.log else p
+
+    def log_modulus(self, p: Any, xp: Any = np) -> Any:
+        return p if self.log else xp.log(p)
+
+    def stiffness(self, p: Any, xp: Any = np) -> Any:
+        """Spring constants D = E A / L_e, (N,) [N/m]."""
+        return self.modulus(p, xp) * (A / self.L_e)
+
+    def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
+        """R = B^T D B u - f, (N,) [N]."""
+        return divergence(self.stiffness(p, xp) * difference(u, xp), xp) - xp.asarray(self.f)
+
+    def tangent(self, u: Array, p: Array) -> Chain:
+        return Chain(self.stiffness(p))
+
+    def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
+        """J = 1/2 |S u - d|^2 + alpha Phi [m^2]."""
+        J = self.sensors.misfit(xp, u)
+        return J + self.alpha * tikhonov(xp, self.log_modulus(p, xp)) if self.alpha else J
+
+    def linearize(self, u: Array, p: Array) -> Linearization:
+        """R_p = B^T diag(dD/dp B u), J_u = S^T (S u - d), J_p = alpha Phi'."""
+        dD_dp = self.stiffness(p) if self.log else np.full_like(p, A / self.L_e)
+        J_p = np.zeros_like(p)
+        if self.alpha:
+            dPhi = tikhonov_gradient(self.log_modulus(p))
+            J_p = self.alpha * (dPhi if self.log else dPhi / p)
+        return Linearization(ElementForces(dD_dp * difference(u)), self.sensors.misfit_gradient(u), J_p)
+
+    def traced(self) -> Traced:
+        from problems.jax64 import jnp
+
+        return Traced(
+            residual=lambda u, p: self.residual(u, p, jnp),
+            objective=lambda u, p: self.objective(u, p, jnp),
+            diagonal=lambda p: self._diagonal(self.stiffness(p, jnp), jnp),
+            spectral_bound=lambda p: self._spectral_bound(self.stiffness(p, jnp), jnp),
+        )
+
+    @staticmethod
+    def _diagonal(D: Any, xp: Any) -> Any:
+        return xp.concatenate([D[:-1] + D[1:], D[-1:]])
+
+    @classmethod
+    def _spectral_bound(cls, D: Any, xp: Any, q: float = 16.0) -> Any:
+        """Gershgorin's max_i 2 K_ii in the q-norm: a bound that stays differentiable where two rows tie."""
+        rows = 2.0 * cls._diagonal(D, xp)
+        largest = xp.max(rows)
+        return largest * xp.sum((rows / largest) ** q) ** (1.0 / q)
+
+    def reference(self, p: Array) -> Reference:
+        """Closed form, in extended precision: u_k = sum_{e <= k} c_e with the compliances c_e = F L_e / (A E_e), so
+
+        dJ/dE_e = - c_e / E_e sum_{sensors k >= e} (u_k - d_k) + alpha dPhi/dE_e
+        """
+        E = self.modulus(p.astype(np.longdouble))
+        c = F * np.longdouble(self.L_e) / (A * E)
+        u = np.cumsum(c)
+        at, d = self.sensors.nodes - 1, self.sensors.d
+        r, size = np.zeros((2, self.n_state), np.longdouble)
+        r[at], size[at] = u[at] - d, u[at] + abs(d)
+        seen_r, seen_size = np.cumsum(r[::-1])[::-1], np.cumsum(size[::-1])[::-1]
+        theta = np.log(E)
+        jumps = np.diff(theta)
+        dPhi = np.concatenate([[0.0], jumps]) - np.concatenate([jumps, [0.0]])
+        dJ_dtheta = -c * seen_r + self.alpha * dPhi
+        chain_rule = 1.0 if self.log else 1.0 / E
+        terms = (c * seen_size + self.alpha * abs(dPhi)) * chain_rule
+        return Reference("closed form", np.asarray(dJ_dtheta * chain_rule, float), float(np.sqrt(np.sum(terms**2))))
+
+    def truth(self) -> Array | None:
+        if not self.synthetic:
+            return None
+        E = true_modulus(self.x)
+        return np.log(E) if self.log else E
+
+    def condition(self, p: Array) -> float:
+        """That of equal springs (eigenvalues 4 k sin^2((2 j - 1) pi / (4 N + 2))), times the contrast of the moduli."""
+        D = self.stiffness(p)
+        return float(D.max() / D.min()) / math.sin(math.pi / (4 * self.n_state + 2)) ** 2
+
+    def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
+        """Forward strain and, for the adjoint, adjoint strain: dJ/dE_e = A L_e eps_e[u] eps_e[lam] (data term)."""
+        eps = difference(u) / self.L_e
+        columns = {"x [m]": self.x, "E [Pa]": self.modulus(p), "strain eps[u]": eps}
+        if lam is not None:
+            eps_lam = difference(lam) / self.L_e
+            columns |= {"adjoint strain eps[lam] [m/N]": eps_lam, "A L_e eps[u] eps[lam]": A * self.L_e * eps * eps_lam}
+        return ParameterView(columns, blind=np.arange(self.n_state) >= self.last_sensor)

@@ -1,0 +1,206 @@
+"""READ FIRST. What a problem is, and the laws it obeys.
+
+    min_p  J(p) = 1/2 |S u(p) - d|^2 + alpha Phi(p)     subject to  R(u(p), p) = 0
+
+A problem is physics only: it evaluates R, J and their partial derivatives at a given (u, p).
+It never solves and never differentiates through a solve; that is what routes are for.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.errors import DomainError, InputError, NotOffered
+
+Array = NDArray[Any]
+Structure = Literal["spd", "symmetric", "general"]
+
+
+class Offers(enum.Flag):
+    """What a problem offers and a route needs. SOLVE contains VALUE, LINEARIZE contains SOLVE."""
+
+    VALUE = 1
+    SOLVE = 2 | VALUE
+    LINEARIZE = 4 | SOLVE
+    TRACE = 8
+    COMPLEX = 16
+
+
+OFFERED_AS = {
+    Offers.VALUE: "J(p) as a number",
+    Offers.SOLVE: "R(u, p), R_u and J(u, p) as numbers",
+    Offers.LINEARIZE: "the partial derivatives R_p, J_u, J_p",
+    Offers.TRACE: "R and J written in jax.numpy",
+    Offers.COMPLEX: "R and J for complex arrays",
+}
+
+
+def offer_names(offers: Offers) -> list[str]:
+    """The most specific names: LINEARIZE stands for the SOLVE and VALUE it contains."""
+    names = [o for o in OFFERED_AS if o in offers]
+    return [str(o.name).lower() for o in names if not any(o in other and o is not other for other in names)]
+
+
+class Operator(Protocol):
+    """Anything with `@` and `.T`: a NumPy array, a SciPy sparse matrix, a matrix known by its structure."""
+
+    @property
+    def T(self) -> Any: ...
+    def __matmul__(self, v: Any, /) -> Any: ...
+
+
+def default_label(i: int) -> str:
+    return f"p_{i + 1}"
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The vector p of length n_p: where it starts, how large a natural change is, where it may live.
+
+    start        (n_p,) the documented starting point
+    scale        (n_p,) > 0, a natural change of p_i: finite differences step by max(|p_i|, scale_i)
+    lower, upper the open interval p_i must lie in
+    unit         of every p_i, for tables
+    label        name of component i (counted from 0)
+    """
+
+    start: Array
+    scale: Array
+    lower: float = -np.inf
+    upper: float = np.inf
+    unit: str = "1"
+    label: Callable[[int], str] = default_label
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def check(self, p: Array, who: str) -> Array:
+        """Return p as float64 or raise DomainError / InputError naming the first component at fault."""
+        p = np.asarray(p, dtype=np.float64)
+        if p.shape != self.start.shape:
+            raise InputError(f"{who}: p has {p.size} values, the problem has {len(self)} parameters - give {len(self)}")
+        bad = np.flatnonzero(~((p > self.lower) & (p < self.upper) & np.isfinite(p)))
+        if bad.size:
+            i = int(bad[0])
+            more = f" (and {bad.size - 1} more)" if bad.size > 1 else ""
+            raise DomainError(
+                f"{who}: {self.label(i)} = {p[i]:g} is outside {self.lower:g} < {self.label(i)} < {self.upper:g}{more}"
+                " - choose values inside"
+            )
+        return p
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """Partial derivatives at (u, p): R_p (n_u, n_p) as an Operator, J_u (n_u,), J_p (n_p,)."""
+
+    R_p: Operator
+    J_u: Array
+    J_p: Array
+
+
+@dataclass(frozen=True)
+class Traced:
+    """The same physics as pure functions of jax.numpy arrays.
+
+    residual(u, p) -> (n_u,), objective(u, p) -> scalar; both must equal the NumPy ones.
+    For stationary iterations on a linear problem, where the problem knows them:
+    diagonal(p) -> (n_u,) of R_u, and spectral_bound(p), a differentiable upper bound of its largest eigenvalue.
+    """
+
+    residual: Callable[[Any, Any], Any]
+    objective: Callable[[Any, Any], Any]
+    diagonal: Callable[[Any], Any] | None = None
+    spectral_bound: Callable[[Any], Any] | None = None
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A gradient to judge others by, found by other means than any route.
+
+    size is the norm of the terms whose cancellation gives the gradient: where |gradient| is below
+    rounding of it, errors are measured against size instead (a zero has no relative error).
+    """
+
+    name: str
+    gradient: Array
+    size: float
+
+
+class Problem:
+    """Base of all problems. Set the attributes, override the methods that `offers` promises.
+
+    name       as in selectors
+    parameters what p is
+    offers     what the methods below provide; a route needing more is skipped with a reason
+    n_state    n_u, the number of free unknowns
+    linear     R is affine in u: one Newton step solves it
+    structure  of R_u: "spd", "symmetric" (indefinite) or "general"
+    notes      sentences a user should read beside the result
+    """
+
+    name: str
+    parameters: Parameters
+    offers: Offers
+    n_state: int
+    linear: bool = False
+    structure: Structure = "general"
+    notes: tuple[str, ...] = ()
+
+    def value(self, p: Array) -> float:
+        """J(p), for a black box that offers VALUE only."""
+        raise NotOffered(f"{self.name}: offers no J(p) - solve R(u, p) = 0 and use objective(u, p)")
+
+    def initial(self, p: Array) -> Array:
+        """The state (n_u,) a cold forward solve starts from, of p's dtype."""
+        return np.zeros(self.n_state, dtype=p.dtype)
+
+    def residual(self, u: Array, p: Array) -> Array:
+        """R(u, p), (n_u,)."""
+        raise NotOffered(f"{self.name}: offers no residual R(u, p)")
+
+    def tangent(self, u: Array, p: Array) -> Any:
+        """R_u(u, p): a Chain, a SciPy sparse matrix or an (n_u, n_u) array."""
+        raise NotOffered(f"{self.name}: offers no tangent R_u")
+
+    def objective(self, u: Array, p: Array) -> Any:
+        """J(u, p), a real number (complex where u or p is)."""
+        raise NotOffered(f"{self.name}: offers no objective J(u, p)")
+
+    def linearize(self, u: Array, p: Array) -> Linearization:
+        """R_p, J_u, J_p at (u, p)."""
+        raise NotOffered(f"{self.name}: offers no partial derivatives R_p, J_u, J_p")
+
+    def traced(self) -> Traced:
+        """R and J for JAX. Import jax inside, through `problems.jax64`."""
+        raise NotOffered(f"{self.name}: offers no jax.numpy version of R and J")
+
+    def reference(self, p: Array) -> Reference | None:
+        """A gradient known by other means (closed form), or None."""
+        return None
+
+    def truth(self) -> Array | None:
+        """The p (n_p,) that made the data, where they are synthetic."""
+        return None
+
+    def condition(self, p: Array) -> float | None:
+        """Estimate of the condition number of R_u, used only to predict iteration counts before paying for them."""
+        return None
+
+    def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
+        """What a person wants beside the gradient, parameter by parameter."""
+        return ParameterView()
+
+
+@dataclass(frozen=True)
+class ParameterView:
+    """Columns (n_p,) to show beside a gradient, and the parameters no datum can see."""
+
+    columns: Mapping[str, Array] = field(default_factory=dict)
+    blind: Array | None = None

@@ -1,0 +1,97 @@
+"""Sensors S that read single unknowns, the data d they measured, and the misfit 1/2 |S u - d|^2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from problems.errors import InputError
+from problems.problem import Array
+from problems.tables import read_columns
+
+Nodes = str | int | Sequence[int]
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """nodes (m,) counted from 1, all different; d (m,) the displacement measured at each [m]."""
+
+    nodes: Array
+    d: Array
+
+    def misfit(self, xp: Any, u: Any) -> Any:
+        """1/2 |S u - d|^2, holomorphic in u (no absolute value), so that complex steps pass. xp: numpy or jax.numpy."""
+        return 0.5 * xp.sum((u[self.nodes - 1] - self.d) ** 2)
+
+    def misfit_gradient(self, u: Array) -> Array:
+        """S^T (S u - d), (n_u,)."""
+        J_u = np.zeros_like(u)
+        J_u[self.nodes - 1] = u[self.nodes - 1] - self.d
+        return J_u
+
+
+def parse_nodes(nodes: Nodes, n: int, who: str) -> Array:
+    """Node numbers (m,) out of 1..n.
+
+    An int M, or text holding one, means nodes 1..M; 0 means none. Any other set is a sequence of node numbers,
+    or text such as `1,3,5`, `1+3+5` or `2..6`. Raises InputError for nodes outside 1..n or given twice.
+    """
+    if isinstance(nodes, str):
+        nodes = _nodes_from_text(nodes, n, who)
+    if isinstance(nodes, int):
+        if not 0 <= nodes <= n:
+            raise InputError(f"{who}: sensors={nodes} asks for nodes 1..{nodes}, there are {n} - choose 0 to {n}")
+        return np.arange(1, nodes + 1)
+    array = np.asarray(nodes, dtype=np.int64)
+    outside = array[(array < 1) | (array > n)]
+    if outside.size:
+        raise InputError(f"{who}: sensor at node {outside[0]}, the nodes are 1..{n} - choose one of them")
+    values, counts = np.unique(array, return_counts=True)
+    if (counts > 1).any():
+        twice = values[counts > 1][0]
+        raise InputError(f"{who}: sensor at node {twice} given {counts.max()} times - give each node once")
+    return array
+
+
+def _nodes_from_text(text: str, n: int, who: str) -> int | list[int]:
+    if text.strip().isdecimal():
+        return int(text)
+    nodes: list[int] = []
+    for item in text.replace("+", ",").split(","):
+        first, dots, last = (part.strip() for part in item.partition(".."))
+        if not first.isdecimal() or (dots and not last.isdecimal()):
+            raise InputError(
+                f"{who}: sensors={text}: {item.strip()!r} is no node - write 5 (the first 5), 1,3,5 or 2..6"
+            )
+        stop = int(last) if dots else int(first)
+        if stop > n or int(first) > stop:
+            raise InputError(f"{who}: sensors={text}: {item.strip()} leaves the nodes 1..{n} - choose nodes among them")
+        nodes.extend(range(int(first), stop + 1))
+    return nodes
+
+
+def measured(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sensors:
+    """Read measured data (columns `node,displacement`); `nodes` picks some of the rows, None takes all.
+
+    Raises InputError for a node that does not exist, is given twice, or is asked for and not in the file.
+    """
+    columns = read_columns(path, ("node", "displacement"))
+    node, d = columns["node"], columns["displacement"]
+    for line, value in enumerate(node, start=2):
+        if value != int(value) or not 1 <= value <= n:
+            raise InputError(f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - mend the row")
+    at = {int(value): k for k, value in enumerate(node)}
+    if len(at) < len(node):
+        twice = next(int(v) for k, v in enumerate(node) if at[int(v)] != k)
+        raise InputError(f"{path}: node {twice} is given twice - keep one row a node")
+    if nodes is None:
+        return Sensors(node.astype(np.int64), d)
+    chosen = parse_nodes(nodes, n, who)
+    absent = [int(k) for k in chosen if int(k) not in at]
+    if absent:
+        raise InputError(f"{path}: no row for node {absent[0]}, which sensors= asks for - add it or choose other nodes")
+    return Sensors(chosen, d[[at[int(k)] for k in chosen]])

@@ -1,0 +1,29 @@
+"""The complex step: a derivative without a subtraction, hence without a step dilemma (Squire & Trapp 1998)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from problems.problem import Array
+from routes.model import Model
+from routes.route import ForwardWork, Offers, Result, Work, route
+
+RELATIVE_STEP = 1e-30  # its square is far below eps, itself far above the smallest float
+
+
+def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
+    return n_p * forward.cold()
+
+
+@route("complex-step", needs=Offers.SOLVE | Offers.COMPLEX, cost=cost)
+def complex_step(model: Model, p: Array) -> Result:
+    """dJ/dp_i = Im J(p + i h e_i) / h,  h = 1e-30 scale_i."""
+    gradient = np.empty_like(p)
+    for i, h in enumerate(RELATIVE_STEP * model.parameters.scale):
+        q = p.astype(np.complex128)
+        q[i] += 1j * h
+        J = model.solve(q).J
+        gradient[i] = J.imag / h
+    return Result(float(J.real), gradient)

@@ -1,0 +1,57 @@
+"""A forward solve as a function JAX differentiates: for the route implicit-ad, and for anyone's own jax.grad."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from problems.jax64 import jax, jnp
+from routes.model import Model
+from routes.newton import State
+
+
+class Solved:
+    """A solved state on JAX's tape: its arrays u, p are leaves, its factors travel along as a constant."""
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+
+
+jax.tree_util.register_pytree_node(
+    Solved, lambda solved: ((solved.state.u, solved.state.p), solved), lambda solved, leaves: solved
+)
+
+
+def differentiable_solve(model: Model, on_solved: Callable[[Solved], None] | None = None) -> Callable[[Any], Any]:
+    """p -> u(p) with R(u, p) = 0, to be differentiated by jax.grad or jax.vjp, eagerly (not under jit).
+
+    The implicit function theorem is its pullback: u_bar -> R_p^T lam with R_u^T lam = -u_bar, one transposed
+    solve with the factors of the forward solve. `on_solved` is told each state that a gradient will reuse.
+    """
+    residual = model.traced.residual
+    R_p_transposed = jax.jit(lambda u, p, lam: jax.vjp(lambda p: residual(u, p), p)[1](lam)[0])
+
+    @jax.custom_vjp
+    def solve(p: Any) -> Any:
+        return jnp.asarray(model.solve(np.asarray(p)).u)
+
+    def forward(p: Any) -> tuple[Any, Solved]:
+        solved = Solved(model.solve(np.asarray(p)))
+        if on_solved is not None:
+            on_solved(solved)
+        return jnp.asarray(solved.state.u), solved
+
+    def backward(solved: Solved, u_bar: Any) -> tuple[Any]:
+        lam = model.solve_transposed(solved.state.factors, -np.asarray(u_bar))
+        return (R_p_transposed(solved.state.u, solved.state.p, lam),)
+
+    solve.defvjp(forward, backward)
+    return solve
+
+
+def held_bytes(pullback: Any) -> int:
+    """Bytes of the arrays a jax.vjp pullback holds until it is called: the tape."""
+    arrays = {id(leaf): leaf.nbytes for leaf in jax.tree.leaves(pullback)}
+    return sum(arrays.values())

@@ -1,0 +1,107 @@
+"""Finite differences of J: nothing but J is needed, and the step is a dilemma (truncation against round-off)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from problems.errors import DomainError, InputError
+from problems.problem import Array, Offers, Parameters, Problem
+from routes.model import Model
+from routes.route import ForwardWork, Result, Work, route
+
+Start = Annotated[
+    Literal["cold", "warm", "chord"],
+    "perturbed solves from scratch; from the base state; from it and on its factors",
+]
+StepOption = Annotated[float | None, "h_i / max(|p_i|, s_i)"]
+EPS = float(np.finfo(np.float64).eps)
+ONE_SIDED, CENTRAL = EPS ** (1 / 2), EPS ** (1 / 3)  # truncation and round-off balance there
+
+
+def check(*, step: float | None, start: str) -> None:
+    if step is not None and not (step > 0 and np.isfinite(step)):
+        raise InputError(f"finite differences: step={step:g} - a step is finite and > 0")
+
+
+def objects(problem: Problem, *, start: str, **options: Any) -> str | None:
+    if start != "cold" and Offers.SOLVE not in problem.offers:
+        return f"start={start} needs R(u, p) and R_u as numbers, which {problem.name} does not offer"
+    return None
+
+
+def cost_one_sided(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
+    return forward.cold() + n_p * perturbed(forward, start, step or ONE_SIDED)
+
+
+def cost_central(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
+    base = Work() if start == "cold" else forward.cold()
+    return base + (2 * n_p) * perturbed(forward, start, step or CENTRAL)
+
+
+def perturbed(forward: ForwardWork, start: str, h: float) -> Work:
+    if start == "cold":
+        return forward.cold()
+    return forward.warm(h) if start == "warm" else forward.chord(h)
+
+
+@route("fd-one-sided", needs=Offers.VALUE, cost=cost_one_sided, check=check, objects=objects)
+def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
+    """(J(p + h_i e_i) - J(p)) / h_i,  h_i = sqrt(eps) max(|p_i|, s_i)."""
+    h = steps(model.parameters, p, ONE_SIDED if step is None else step, "fd-one-sided", sides=(1,))
+    J_near, J_base = objective_near(model, p, start)
+    J = J_near(p) if J_base is None else J_base
+    gradient = np.array([(J_near(shifted(p, i, h[i])) - J) / h[i] for i in range(len(p))])
+    return Result(J, gradient)
+
+
+@route("fd-central", needs=Offers.VALUE, cost=cost_central, check=check, objects=objects)
+def fd_central(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
+    """(J(p + h_i e_i) - J(p - h_i e_i)) / 2 h_i,  h_i = cbrt(eps) max(|p_i|, s_i)."""
+    h = steps(model.parameters, p, CENTRAL if step is None else step, "fd-central", sides=(1, -1))
+    J_near, J = objective_near(model, p, start)
+    gradient = np.array(
+        [(J_near(shifted(p, i, h[i])) - J_near(shifted(p, i, -h[i]))) / (2 * h[i]) for i in range(len(p))]
+    )
+    return Result(J, gradient)
+
+
+def steps(parameters: Parameters, p: Array, relative: float, who: str, sides: tuple[int, ...]) -> Array:
+    """h (n_p,), rounded so that (p + h) - p == h exactly.
+
+    Raises DomainError for a step that leaves the domain or vanishes.
+    """
+    h: Array = (p + relative * np.maximum(np.abs(p), parameters.scale)) - p
+    for side in sides:
+        q = p + side * h
+        bad = np.flatnonzero((q <= parameters.lower) | (q >= parameters.upper))
+        if bad.size:
+            i = int(bad[0])
+            name, bound = parameters.label(i), parameters.lower if q[i] <= parameters.lower else parameters.upper
+            raise DomainError(
+                f"{who}: the step {side * h[i]:g} from {name} = {p[i]:g} passes its bound {bound:g}"
+                f" - choose step= below {abs(bound - p[i]) / abs(h[i]) * relative:.3g}"
+            )
+    if not h.all():
+        i = int(np.flatnonzero(h == 0)[0])
+        raise DomainError(
+            f"{who}: step={relative:g} does not change {parameters.label(i)} = {p[i]:g} - choose step= above {EPS:.1e}"
+        )
+    return h
+
+
+def shifted(p: Array, i: int, h: float) -> Array:
+    q = p.copy()
+    q[i] += h
+    return q
+
+
+def objective_near(model: Model, p: Array, start: str) -> tuple[Callable[[Array], float], float | None]:
+    """J as a function for points near p, and J(p) where finding that function took a solve at p."""
+    if start == "cold":
+        return model.value, None
+    base = model.solve(p)
+    factors = base.factors if start == "chord" else None
+    return lambda q: float(model.solve(q, base, factors).J), float(base.J)

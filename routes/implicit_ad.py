@@ -1,0 +1,33 @@
+"""Implicit differentiation: the forward solve is one node of JAX's graph, an adjoint solve its pullback."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from problems.problem import Array
+from routes.adjoint import cost
+from routes.model import Model
+from routes.route import Gradient, Offers, Result, route
+
+if TYPE_CHECKING:
+    from routes.differentiable import Solved
+
+
+@route("implicit-ad", needs=Offers.SOLVE | Offers.TRACE, cost=cost, staged=True)
+def implicit_ad(model: Model, p: Array) -> Gradient:
+    """dJ/dp = vjp of p -> J(u(p), p), the pullback of u(p) being one adjoint solve (jax.custom_vjp)."""
+    from problems.jax64 import jax
+    from routes.differentiable import differentiable_solve, held_bytes
+
+    solved: list[Solved] = []
+    solve = differentiable_solve(model, solved.append)
+    objective = jax.jit(model.traced.objective)
+
+    def gradient(p: Array) -> Result:
+        J, pullback = jax.vjp(lambda p: objective(solve(p), p), p)
+        state = solved.pop().state
+        return Result(float(J), np.asarray(pullback(1.0)[0]), state.u, state.residual, tape=held_bytes(pullback))
+
+    return gradient

@@ -1,0 +1,120 @@
+"""The forward solve R(u, p) = 0 by Newton's method, written once for every problem."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.errors import NotConverged
+from problems.problem import Array
+from routes.factorization import Factorization
+from routes.tally import Work
+
+ROUNDING = 16.0 * np.finfo(np.float64).eps  # |R| <= ROUNDING |R_u| |u|: no iteration can do better
+
+
+@dataclass(frozen=True)
+class Solver:
+    """When a forward solve is done: |R|_inf <= rtol |R(u_0)|_inf, or R is rounding; at most max_steps steps."""
+
+    rtol: float = 1e-12
+    max_steps: int = 50
+
+
+@dataclass(frozen=True)
+class State:
+    """A solved state: u (n_u,) and J at p (n_p,).
+
+    factors belong to the last step (for a linear problem: to R_u itself), history holds |R|_inf of every
+    iterate, scale is the |R|_inf that tolerances are relative to.
+    """
+
+    p: Array
+    u: Array
+    J: Any
+    history: tuple[float, ...]
+    scale: float
+    factors: Factorization
+
+    @property
+    def residual(self) -> float:
+        """Achieved |R|_inf relative to scale."""
+        return self.history[-1] / self.scale if self.scale else self.history[-1]
+
+
+@dataclass(frozen=True)
+class Step:
+    """The doorways Newton's method needs, bound to one p."""
+
+    residual: Callable[[Array], Array]
+    factorize: Callable[[Array], Factorization]
+    correct: Callable[[Factorization, Array], Array]
+
+
+def newton(
+    step: Step, u: Array, solver: Solver, who: str, scale: float | None = None, factors: Factorization | None = None
+) -> tuple[Array, tuple[float, ...], float, Factorization]:
+    """u <- u - R_u^{-1} R until |R| is small; with `factors`, chord steps u <- u - A^{-1} R that keep them.
+
+    At least one step is taken, so that a warm start is never returned untouched and the factors are those
+    of the neighbourhood. Returns u, the history of |R|_inf, the scale and the last factors.
+    Raises NotConverged with the history.
+    """
+    chord = factors
+    R = step.residual(u)
+    history = [norm(R)]
+    scale = history[0] if scale is None else scale
+    for _ in range(solver.max_steps):
+        factors = chord or step.factorize(u)
+        u = u - step.correct(factors, R)
+        R = step.residual(u)
+        history.append(norm(R))
+        if history[-1] <= max(solver.rtol * scale, ROUNDING * factors.norm * norm(u)):
+            return u, tuple(history), scale, factors
+        if not math.isfinite(history[-1]):
+            break
+    steps = f"|R| = {history[-1]:.3g} after {len(history) - 1} steps, started at {history[0]:.3g}"
+    wanted = f"wanted {solver.rtol * scale:.3g}"
+    raise NotConverged(f"{who}: not converged: {steps}, {wanted} - lower the load or start nearer", tuple(history))
+
+
+def norm(v: Array) -> float:
+    """|v|_inf."""
+    return float(np.abs(v).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class ForwardWork:
+    """The declared work of one forward solve that takes k Newton steps, and of perturbed ones.
+
+    A perturbation of relative size h leaves |R| ~ h at the base state. A Newton step squares that, a chord step
+    multiplies it by h; a linear problem takes one Newton step. k = 0 stands for a black box J(p).
+    """
+
+    k: int
+    linear: bool = True
+    rtol: float = Solver.rtol
+
+    def cold(self) -> Work:
+        return self._newton(self.k)
+
+    def warm(self, h: float) -> Work:
+        return self._newton(1 if self.linear else max(1, math.ceil(math.log2(self._decades(h)))))
+
+    def chord(self, h: float) -> Work:
+        steps = max(1, math.ceil(self._decades(h)) - 1)
+        return Work(forward_solves=1, newton_iterations=steps, residuals=steps + 1, solves=steps)
+
+    def _decades(self, h: float) -> float:
+        """log rtol / log h, how often the perturbation must multiply itself to vanish."""
+        return math.log(self.rtol) / math.log(min(h, 0.5))
+
+    @staticmethod
+    def _newton(k: int) -> Work:
+        if k == 0:
+            return Work(forward_solves=1)
+        return Work(1, newton_iterations=k, residuals=k + 1, assemblies=k, factorizations=k, solves=k)

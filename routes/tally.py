@@ -1,0 +1,56 @@
+"""What a gradient costs, in counted work: declared by formulas, measured by counting, compared by ==."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, fields
+
+
+@dataclass(frozen=True)
+class Work:
+    """Numbers of expensive operations.
+
+    forward_solves     solves of R(u, p) = 0 from start to finish
+    newton_iterations  steps inside them (a chord step on given factors counts as one)
+    residuals          evaluations of R
+    matvecs            products with R_u or R_u^T, traced iterations included
+    assemblies         assemblies of R_u
+    factorizations     numeric factorizations
+    solves             substitutions with factors of R_u, one per right-hand side
+    transposed_solves  substitutions with factors of R_u^T, one per right-hand side
+    """
+
+    forward_solves: int = 0
+    newton_iterations: int = 0
+    residuals: int = 0
+    matvecs: int = 0
+    assemblies: int = 0
+    factorizations: int = 0
+    solves: int = 0
+    transposed_solves: int = 0
+
+    def __add__(self, other: Work) -> Work:
+        return Work(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __sub__(self, other: Work) -> Work:
+        return Work(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __rmul__(self, times: int) -> Work:
+        return Work(*(times * a for a in astuple(self)))
+
+
+KINDS = tuple(f.name for f in fields(Work))
+
+
+class Tally:
+    """Counts work as it passes a Model's doorways. Only ever incremented: take `work` before, subtract after."""
+
+    def __init__(self) -> None:
+        self._counts = dict.fromkeys(KINDS, 0)
+
+    def count(self, kind: str, times: int = 1) -> None:
+        self._counts[kind] += times
+
+    @property
+    def work(self) -> Work:
+        """The counts so far, a value that later counting leaves as it is."""
+        return Work(**self._counts)
