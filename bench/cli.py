@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,10 @@ import click
 from problems.errors import DomainError, InputError
 
 if TYPE_CHECKING:
-    from bench.runner import Outcome
+    from bench.rows import Row
+    from bench.runner import Outcome, View
 
-WRONG_USAGE = 2
+WRONG_USAGE, INTERRUPTED = 2, 130
 STORE = Path("results") / "routes.sqlite"
 
 
@@ -29,6 +30,9 @@ class Routes(click.Group):
                 raise
             click.echo(f"routes: {error}", err=True)
             ctx.exit(WRONG_USAGE)
+        except KeyboardInterrupt:
+            click.echo("routes: interrupted - finished cases are printed, and kept unless --no-store", err=True)
+            ctx.exit(INTERRUPTED)
 
 
 @click.group(cls=Routes, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -121,28 +125,26 @@ def run(
                 click.echo(json_line(outcome.row))
     finally:  # an interrupt leaves what was measured on the screen, too
         if not as_json:
-            show(done)
+            show([o.row for o in done], [(o.row, o.view) for o in done if o.view is not None])
     for outcome in done if debug else []:
         click.echo(outcome.traceback or "", err=True, nl=False)
     if any(outcome.row["status"] == "failed" for outcome in done):
         sys.exit(1)
 
 
-def show(outcomes: list[Outcome]) -> None:
+def show(rows: list[Row], views: Iterable[tuple[Row, View]] = ()) -> None:
     """The table, the reasons and notes below it, the gradients where they were asked for."""
     from bench.views import tables
 
-    if not outcomes:
+    if not rows:
         return
     out = tables.console()
-    rows = [outcome.row for outcome in outcomes]
     out.print(tables.results(rows))
     for line in tables.remarks(rows):
         out.print(line, soft_wrap=True)
-    for outcome in outcomes:
-        if outcome.view is not None:
-            out.print()
-            out.print(tables.gradient(outcome.row, outcome.view))
+    for row, view in views:
+        out.print()
+        out.print(tables.gradient(row, view))
 
 
 def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
@@ -178,16 +180,4 @@ def report(store: Path, debug: bool) -> None:
     """The tables of everything the store holds."""
     from bench.store import Store
 
-    show_stored(Store(store).rows())
-
-
-def show_stored(rows: list[dict[str, Any]]) -> None:
-    from bench.views import tables
-
-    out = tables.console()
-    out.print(tables.results(rows))
-    for line in tables.remarks(rows):
-        out.print(line, soft_wrap=True)
-
-
-__all__ = ["main"]
+    show(Store(store).rows())

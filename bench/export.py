@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import click
+
 from bench.store import Store
 from problems.errors import InputError
-
-FORMATS = ("csv", "parquet", "json")
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
@@ -20,7 +20,7 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
     try:
-        with open(output, "wb") if output is not None else sys.stdout.buffer as file:
+        with click.open_file(str(output or "-"), "wb") as file:
             if format == "parquet":
                 frame.to_parquet(file, index=False)
             elif format == "json":

@@ -17,7 +17,7 @@ from bench.memory import peak_of
 from bench.rows import Row, empty_row
 from bench.timing import Samples, rounds, seconds_of
 from problems.errors import RoutesError
-from problems.problem import Array, Offers, ParameterView, Problem, Reference
+from problems.problem import Array, Offers, ParameterView, Reference
 from routes.model import Model
 from routes.newton import State
 from routes.route import Result, Route
@@ -200,6 +200,3 @@ class Workbench:
         columns = ParameterView() if state is None else self.problem.view(self.p, state.u, result.lam)
         labels = [self.problem.parameters.label(i) for i in range(len(self.p))]
         return View(labels, np.asarray(result.gradient), self.reference(route), columns)
-
-
-__all__ = ["Outcome", "Problem", "Settings", "View", "Workbench", "run"]

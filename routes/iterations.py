@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from jax.extend.core import jaxprs_in_params
+
 from problems.jax64 import jax, jnp
 from problems.problem import Traced
 
@@ -133,5 +135,5 @@ def count_products(jaxpr: Any, times: int = 0) -> int:
             count += times
             continue
         inside = max(times, 1) * eqn.params["length"] if eqn.primitive.name == "scan" else times
-        count += sum(count_products(inner, inside) for inner in jax.core.jaxprs_in_params(eqn.params))
+        count += sum(count_products(inner, inside) for inner in jaxprs_in_params(eqn.params))
     return count

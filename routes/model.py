@@ -56,6 +56,14 @@ class Model:
         self.tally.count("transposed_solves")
         return factors.solve_transposed(b)
 
+    def factors_at(self, state: State) -> Factorization:
+        """Factors of R_u at the solved state itself.
+
+        The last Newton factors belong to the iterate before: a linearized solve with them is off by the size of
+        the last step (1e-8 and worse). Only a linear problem's fit.
+        """
+        return state.factors if self.problem.linear else self.factorize(self.tangent(state.u, state.p))
+
     def newton_correction(self, factors: Factorization, R: Array) -> Array:
         self.tally.count("newton_iterations")
         return self.solve_linear(factors, R)
@@ -67,7 +75,8 @@ class Model:
     def solve(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> State:
         """Solve R(u, p) = 0: cold, warm from the state `start`, by chord steps if `factors` are given.
 
-        p may be complex where the problem offers COMPLEX. Raises NotConverged, SingularMatrix.
+        p may be complex where the problem offers COMPLEX: the imaginary part, a derivative, converges one Newton
+        step behind the real part that is watched, so one more is taken. Raises NotConverged, SingularMatrix.
         """
         self.tally.count("forward_solves")
         step = Step(
@@ -77,7 +86,8 @@ class Model:
         )
         u = self.problem.initial(p) if start is None else start.u.astype(p.dtype)
         scale = None if start is None else start.scale
-        u, history, scale, last = newton(step, u, self.solver, self.problem.name, scale, factors)
+        polish = int(np.iscomplexobj(p) and not self.problem.linear)
+        u, history, scale, last = newton(step, u, self.solver, self.problem.name, scale, factors, polish)
         return State(p, u, self.problem.objective(u, p), history, scale, last)
 
     def relative_residual(self, u: Array, p: Array) -> float:

@@ -56,13 +56,19 @@ class Step:
 
 
 def newton(
-    step: Step, u: Array, solver: Solver, who: str, scale: float | None = None, factors: Factorization | None = None
+    step: Step,
+    u: Array,
+    solver: Solver,
+    who: str,
+    scale: float | None = None,
+    factors: Factorization | None = None,
+    polish: int = 0,
 ) -> tuple[Array, tuple[float, ...], float, Factorization]:
     """u <- u - R_u^{-1} R until |R| is small; with `factors`, chord steps u <- u - A^{-1} R that keep them.
 
     At least one step is taken, so that a warm start is never returned untouched and the factors are those
-    of the neighbourhood. Returns u, the history of |R|_inf, the scale and the last factors.
-    Raises NotConverged with the history.
+    of the neighbourhood; after convergence, `polish` more. Returns u, the history of |R|_inf, the scale and
+    the last factors. Raises NotConverged with the history.
     """
     chord = factors
     R = step.residual(u)
@@ -74,7 +80,9 @@ def newton(
         R = step.residual(u)
         history.append(norm(R))
         if history[-1] <= max(solver.rtol * scale, ROUNDING * factors.norm * norm(u)):
-            return u, tuple(history), scale, factors
+            if polish == 0:
+                return u, tuple(history), scale, factors
+            polish -= 1
         if not math.isfinite(history[-1]):
             break
     steps = f"|R| = {history[-1]:.3g} after {len(history) - 1} steps, started at {history[0]:.3g}"
@@ -101,6 +109,14 @@ class ForwardWork:
 
     def cold(self) -> Work:
         return self._newton(self.k)
+
+    def complex(self) -> Work:
+        """Cold, at a complex p: see Model.solve."""
+        return self._newton(self.k if self.linear or self.k == 0 else self.k + 1)
+
+    def factors_at_solution(self) -> Work:
+        """See Model.factors_at."""
+        return Work() if self.linear else Work(assemblies=1, factorizations=1)
 
     def warm(self, h: float) -> Work:
         return self._newton(1 if self.linear else max(1, math.ceil(math.log2(self._decades(h)))))

@@ -97,14 +97,15 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
     """A legend, reasons of skipped and failed cases, then notes, each once."""
     judges = references(rows)
     against = f" against the {judges[0]}" if len(judges) == 1 else ""
-    legend = f"error: |g - g_ref| / |g_ref|{against}; x fwd: time in forward solves; work: {LEGEND}"
+    legend = f"error: |g - g_ref| / |g_ref|{against}; x fwd: time in forward solves\nwork: {LEGEND}"
     lines = {"": Text(legend, style="dim")}
     for row in rows:
         if row["status"] != "ok":
             style = "dim" if row["status"] == "skipped" else "red"
             reason = row["reason"]
             head = "" if reason.startswith(row["route"]) else f"{row['route']}: "
-            lines.setdefault(reason, Text(f"{row['status']}: {head}{reason}", style=style))
+            line = f"{row['status']}: {head}{reason}"
+            lines.setdefault(line, Text(line, style=style))
     for row in rows:
         for note in (row["note"] or "").split("; "):
             if note:

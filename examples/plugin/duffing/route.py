@@ -1,0 +1,29 @@
+"""Central differences at h and 2 h, extrapolated: four solves a parameter, O(h^4). A route in one file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+
+from problems.problem import Array, Offers
+from routes.finite_difference import EPS, shifted, steps
+from routes.model import Model
+from routes.route import ForwardWork, Result, Work, route
+
+STEP = EPS ** (1 / 5)  # balances the truncation h^4 against the round-off eps / h
+
+
+def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
+    return (4 * n_p) * forward.cold()
+
+
+@route("fd-extrapolated", needs=Offers.VALUE, cost=cost)
+def fd_extrapolated(model: Model, p: Array, *, step: Annotated[float | None, "h_i / max(|p_i|, s_i)"] = None) -> Result:
+    """(8 (J(p + h) - J(p - h)) - (J(p + 2 h) - J(p - 2 h))) / 12 h (Richardson 1911)."""
+    h = steps(model.parameters, p, STEP if step is None else step, "fd-extrapolated", sides=(2, -2))
+    gradient = np.empty_like(p)
+    for i in range(len(p)):
+        J = {s: model.value(shifted(p, i, s * h[i])) for s in (-2, -1, 1, 2)}
+        gradient[i] = (8 * (J[1] - J[-1]) - (J[2] - J[-2])) / (12 * h[i])
+    return Result(None, gradient)

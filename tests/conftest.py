@@ -1,0 +1,104 @@
+"""What tests share: the zoo of problems and routes they multiply, and the command line as a function."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from bench.cli import main
+from problems.bar import Bar
+from problems.problem import Array, Problem
+from routes.adjoint import adjoint
+from routes.complex_step import complex_step
+from routes.finite_difference import fd_central, fd_one_sided
+from routes.implicit_ad import implicit_ad
+from routes.tangent import tangent
+from routes.unrolled_ad import unrolled_ad
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "examples" / "plugin"))  # its problem is a second, nonlinear, member of the zoo
+
+from duffing.problem import Duffing  # noqa: E402
+
+EXACT = (tangent, adjoint, complex_step, implicit_ad)
+ROUTES = (fd_one_sided, fd_central, *EXACT, unrolled_ad)
+OPTIONS = {
+    "fd-one-sided": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
+    "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
+    "unrolled-ad": [{"inner": i, "iterations": None} for i in ("cg", "richardson", "jacobi")],
+}
+BARS = {
+    "bar[n=1]": {"n": 1},
+    "bar[n=2]": {"n": 2},
+    "bar": {},
+    "bar[raw]": {"parametrization": "raw"},
+    "bar[alpha]": {"alpha": 0.3},
+    "bar[raw,alpha]": {"parametrization": "raw", "alpha": 0.3},
+    "bar[sensors]": {"n": 12, "sensors": [2, 3, 7]},
+    "bar[noise]": {"n": 21, "sensors": 21, "noise": 0.01, "seed": 4},
+}
+
+
+def zoo() -> dict[str, Problem]:
+    """Every registered kind of problem, in small variants."""
+    return {name: Bar(**options) for name, options in BARS.items()} | {"duffing": Duffing()}
+
+
+def somewhere(problem: Problem, seed: int = 0) -> Array:
+    """A random p near the start, inside its domain."""
+    p = problem.parameters.start + 0.3 * np.random.default_rng(seed).uniform(-1, 1, len(problem.parameters))
+    return problem.parameters.check(p, "test")
+
+
+def relative_error(g: Array, reference: Array) -> float:
+    return float(np.linalg.norm(g - reference) / np.linalg.norm(reference))
+
+
+@dataclass(frozen=True)
+class Ran:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """One JSON object a line, nothing else: anything else fails here."""
+        return [json.loads(line, parse_constant=lambda c: pytest.fail(c)) for line in self.out.splitlines()]
+
+
+@pytest.fixture
+def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The command line, called in this process, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["routes", *arguments])
+        result = CliRunner().invoke(main, list(arguments))
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return Ran(result.exit_code, result.stdout, result.stderr)
+
+    return call
+
+
+def shell(command: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A command as a user types it, `routes` being the one of this environment."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    return subprocess.run(
+        command,
+        shell=True,
+        cwd=cwd,
+        env={**os.environ, "PATH": path, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )

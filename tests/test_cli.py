@@ -1,0 +1,281 @@
+"""The command line: what it prints, what it keeps, how it ends."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT, shell
+
+from bench.rows import COLUMNS
+from problems.bar import Bar
+from routes.tally import KINDS
+
+FIELDS = (
+    "problem problem_options route route_options status reason n_state n_param objective gradient gradient_norm "
+    "gradient_error reference prepare_s first_s seconds forward_s peak_bytes tape_bytes work predicted_work"
+).split()
+QUICK = ("--min-time", "0")
+
+
+def run(cli, *arguments: str, problem: str = "bar", route: str = "adjoint"):
+    return cli("run", "--problem", problem, "--route", route, *QUICK, *arguments)
+
+
+def test_json_rows_are_complete(cli) -> None:
+    ran = run(cli, "--json", route="all")
+    assert (ran.code, ran.err) == (0, "")
+    names = "fd-one-sided fd-central complex-step tangent adjoint unrolled-ad implicit-ad"
+    assert [row["route"] for row in ran.rows] == names.split()
+    bar = Bar()
+    reference = bar.reference(bar.parameters.start)
+    for row in ran.rows:
+        assert set(FIELDS) <= row.keys() == {c.name for c in COLUMNS}
+        assert row["status"] == "ok"
+        assert row["work"].keys() == set(KINDS)
+        assert row["work"] == row["predicted_work"]
+        assert row["gradient_error"] < (1e-5 if row["route"].startswith("fd") else 1e-12)
+        assert row["gradient_norm"] == pytest.approx(np.linalg.norm(row["gradient"]), rel=1e-15)
+        np.testing.assert_allclose(row["gradient"], reference.gradient, rtol=1e-5, atol=1e-12)
+        assert row["seconds"] > 0 < row["forward_s"]
+        assert row["peak_bytes"] >= 0
+        assert (row["tape_bytes"] is not None) == row["route"].endswith("-ad")
+    assert {row["objective"] for row in ran.rows} != {None}
+
+
+def test_long_gradients_come_on_demand(cli) -> None:
+    problem = "bar[n=65]"
+    assert run(cli, "--json", problem=problem).rows[0]["gradient"] is None
+    assert len(run(cli, "--json", "--gradient", problem=problem).rows[0]["gradient"]) == 65
+
+
+def test_the_table_tells_the_bill(cli) -> None:
+    out = run(cli, route="all").out
+    for words in ("n_u", "n_p", "error", "x fwd", "1 fwd + 8 lin", "1 fwd + 1 adj", "16 fwd", "KiB", "closed form"):
+        assert words in out
+    assert "3 of 8 elements lie behind the last sensor: blind" in out
+
+
+def test_gradient_view_shows_strains_and_the_blind(cli) -> None:
+    out = run(cli, "--gradient").out
+    assert "adjoint strain eps[lam] [m/N]" in out
+    assert sum(line.rstrip().endswith("blind") for line in out.splitlines() if line.startswith("log E_")) == 3
+    assert "1000 more" not in run(cli, "--gradient", problem="bar[n=1064]").out.split("...")[0]
+    assert "... 1000 more" in run(cli, "--gradient", problem="bar[n=1064]").out
+
+
+def test_grids_and_repeats_multiply(cli) -> None:
+    problems = ("--problem", "bar[n=1|2]", "--problem", "bar[sensors=1,3]")
+    ran = cli("run", *problems, "--route", "fd-central[start=cold|warm]", "--route", "adjoint", "--json", *QUICK)
+    assert [(r["n_param"], r["route"], r["route_options"].get("start")) for r in ran.rows] == [
+        (n, *route) for n in (1, 2, 8) for route in (("fd-central", "cold"), ("fd-central", "warm"), ("adjoint", None))
+    ]
+
+
+def test_points_to_differentiate_at(cli, tmp_path: Path) -> None:
+    truth = run(cli, "--json", "--at", "true").rows[0]
+    assert truth["objective"] < 1e-30
+    assert truth["gradient_error"] < 1e-15
+    assert "relative to its terms" in truth["reference"]
+    (tmp_path / "p.csv").write_text("log_E\n" + "0.5\n" * 8)
+    halfway = run(cli, "--json", "--at", "p.csv").rows[0]
+    bar = Bar()
+    np.testing.assert_allclose(halfway["gradient"], bar.reference(np.full(8, 0.5)).gradient, rtol=1e-12)
+
+
+def test_a_million_moduli_answer_in_seconds(cli) -> None:
+    rows = {row["route"]: row for row in run(cli, "--json", problem="bar[n=1000000]", route="all").rows}
+    done = {name for name, row in rows.items() if row["status"] == "ok"}
+    assert done == {"adjoint", "implicit-ad"}
+    for name in rows.keys() - done:
+        assert rows[name]["status"] == "skipped"
+        assert "predicted" in rows[name]["reason"]
+        assert "--budget inf" in rows[name]["reason"]
+        assert rows[name]["predicted_s"] > 60
+    for name in done:
+        assert rows[name]["gradient_error"] < 1e-12
+
+
+def test_the_budget_is_the_users(cli) -> None:
+    skipped = run(cli, "--json", "--budget", "1e-9").rows[0]
+    assert skipped["status"] == "skipped"
+    assert skipped["seconds"] is None
+    assert run(cli, "--json", "--budget", "inf").rows[0]["status"] == "ok"
+
+
+def test_an_overflowing_tape_is_a_failed_row_not_a_nan(cli, tmp_path: Path) -> None:
+    """On rough moduli the backward sweep of CG amplifies without bound: the row says so, the next case runs."""
+    p = np.random.default_rng(0).standard_normal(1000)
+    np.savetxt(tmp_path / "p.csv", p, header="log_E", comments="")
+    ran = cli("run", "--problem", "bar[n=1000,sensors=1000]", "--route", "unrolled-ad", "--route", "adjoint", "--json",
+              "--at", "p.csv", *QUICK)  # fmt: skip
+    assert ran.code == 1
+    assert ran.rows[0]["status"] == "failed"
+    assert "not finite" in ran.rows[0]["reason"]
+    assert ran.rows[0]["gradient"] is None
+    assert ran.rows[1]["status"] == "ok"
+
+
+def test_a_step_out_of_the_domain_fails_its_case_only(cli, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("E\n" + "1e-9\n" * 8)
+    ran = cli("run", "--problem", "bar[parametrization=raw]", "--route", "fd-central", "--route", "adjoint", "--json",
+              "--at", "p.csv", *QUICK)  # fmt: skip
+    assert ran.code == 1
+    assert "passes its bound 0" in ran.rows[0]["reason"]
+    assert ran.rows[1]["status"] == "ok"
+
+
+WRONG = {
+    "unknown problem": (["run", "--problem", "barr", "--route", "adjoint"], "no problem 'barr' - did you mean 'bar'?"),
+    "unknown route": (["run", "--problem", "bar", "--route", "adjiont"], "did you mean 'adjoint'?"),
+    "unknown option": (["run", "--problem", "bar[m=8]", "--route", "adjoint"], "bar: no option 'm'"),
+    "option of no option": (["run", "--problem", "bar", "--route", "adjoint[h=1]"], "adjoint: no option 'h'"),
+    "grid with a typo": (["run", "--problem", "bar[n=8|1x]", "--route", "adjoint"], "n=1x is not a whole number"),
+    "broken selector": (["run", "--problem", "bar[n=8", "--route", "adjoint"], "write NAME"),
+    "options of all": (["run", "--problem", "all[n=8]", "--route", "adjoint"], "'all' takes no options"),
+    "zero N": (["run", "--problem", "bar[n=0]", "--route", "adjoint"], "choose n >= 1"),
+    "negative N": (["run", "--problem", "bar[n=-8]", "--route", "adjoint"], "choose n >= 1"),
+    "sensor out of range": (["run", "--problem", "bar[sensors=3,9]", "--route", "adjoint"], "nodes 1..8"),
+    "sensor repeated": (["run", "--problem", "bar[sensors=3,3]", "--route", "adjoint"], "each node once"),
+    "negative alpha": (["run", "--problem", "bar[alpha=-1]", "--route", "adjoint"], "finite and >= 0"),
+    "no data file": (["run", "--problem", "bar[data=no.csv]", "--route", "adjoint"], "no.csv: cannot be read"),
+    "data without truth": (
+        ["run", "--problem", f"bar[data={ROOT}/examples/bar_displacements.csv]", "--route", "adjoint", "--at", "true"],
+        "not known",
+    ),
+    "no p file": (["run", "--problem", "bar", "--route", "adjoint", "--at", "no.csv"], "no.csv: cannot be read"),
+    "bad step": (["run", "--problem", "bar", "--route", "fd-central[step=-1]"], "finite and > 0"),
+    "bad iterations": (["run", "--problem", "bar", "--route", "unrolled-ad[iterations=0]"], "at least 1"),
+    "bad budget": (["run", "--problem", "bar", "--route", "adjoint", "--budget", "nan"], "--budget"),
+    "bad time": (["run", "--problem", "bar", "--route", "adjoint", "--min-time", "inf"], "--min-time"),
+    "bad point after a good one": (
+        ["run", "--problem", "bar[n=8|0]", "--route", "adjoint"],
+        "choose n >= 1",
+    ),
+    "export of nothing": (["export", "--store", "no.sqlite"], "no such file"),
+    "report of nothing": (["report", "--store", "no.sqlite"], "no such file"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_usage_is_one_line_and_exit_code_two(cli, case: str) -> None:
+    arguments, says = WRONG[case]
+    ran = cli(*arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("routes: ")
+    assert says in ran.err
+    assert ran.err.count("\n") == 1
+    assert not list(Path().glob("results/*")), "nothing ran, nothing is kept"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("E\n" + "1\n" * 7, "7 values, the problem has 8"),
+        ("E\n" + "1\n" * 7 + "x\n", "line 9, column E: 'x' is not a number"),
+        ("E\n" + "1\n" * 7 + "nan\n", "nan is not finite"),
+        ("E\n" + "1\n" * 7 + "-2\n", "E_8 = -2 is outside 0 < E_8"),
+        ("E,F\n" + "1,2\n" * 8, "has 2 columns"),
+        ("1\n" * 8, "line 1 holds numbers"),
+        ("", "empty"),
+    ],
+)
+def test_wrong_points_are_named(cli, tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "p.csv").write_text(text)
+    ran = run(cli, "--at", "p.csv", problem="bar[parametrization=raw]")
+    assert (ran.code, ran.out) == (2, "")
+    assert says in ran.err
+
+
+def test_click_finds_wrong_flags_itself(cli) -> None:
+    assert cli("run", "--problem", "bar").code == 2
+    assert cli("rnu").code == 2
+    assert cli("run", "--problem", "bar", "--route", "adjoint", "--budget", "x").code == 2
+
+
+def test_debug_shows_the_traceback(tmp_path: Path) -> None:
+    plain = shell("routes run --problem barr --route adjoint", tmp_path)
+    debug = shell("routes run --problem barr --route adjoint --debug", tmp_path)
+    assert (plain.returncode, "Traceback" in plain.stderr) == (2, False)
+    assert "Traceback" in debug.stderr
+
+
+@pytest.mark.parametrize("what", [[], ["problems"], ["routes"]])
+def test_list_shows_options_and_contracts(cli, what: list[str]) -> None:
+    out = cli("list", *what).out
+    assert ("parametrization=log|raw" in out) == (what != ["routes"])
+    assert ("inner=cg|richardson|jacobi" in out) == (what != ["problems"])
+    assert ("offers: linearize, trace, complex" in out) == (what != ["routes"])
+    assert ("R_u^T lam = -J_u" in out) == (what != ["problems"])
+
+
+def test_help_names_every_verb(cli) -> None:
+    out = cli("--help").out
+    for verb in ("list", "run", "export", "report"):
+        assert verb in out
+        assert cli(verb, "--help").code == 0
+
+
+def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
+    done = shell("routes run --problem bar --route adjoint --route tangent --min-time 0", tmp_path)
+    assert "\x1b" not in done.stdout + done.stderr
+    cut = shell("routes run --json --problem 'bar[n=1|2|3]' --route all --budget 1 | head -1", tmp_path)
+    assert "Traceback" not in cut.stderr
+
+
+def test_a_terminal_gets_a_progress_bar_for_more_than_one_case(tmp_path: Path) -> None:
+    def screen(problem: str) -> str:
+        leader, follower = pty.openpty()
+        command = [str(Path(sys.executable).with_name("routes")), "run", "--no-store", "--problem", problem]
+        child = subprocess.Popen(
+            [*command, "--route", "adjoint"], stdout=follower, stderr=follower, cwd=tmp_path, close_fds=True
+        )
+        os.close(follower)
+        shown = b""
+        while child.poll() is None or select.select([leader], [], [], 0.1)[0]:
+            try:
+                shown += os.read(leader, 65536) if select.select([leader], [], [], 0.1)[0] else b""
+            except OSError:  # the other end is closed
+                break
+        os.close(leader)
+        assert child.wait() == 0
+        return shown.decode()
+
+    assert "cases" in screen("bar[n=1|2]")
+    assert "cases" not in screen("bar")
+
+
+def test_an_interrupt_keeps_and_shows_what_was_measured(tmp_path: Path) -> None:
+    command = [str(Path(sys.executable).with_name("routes")), "run", "--problem", "bar", "--problem", "bar[n=3000]"]
+    child = subprocess.Popen(
+        [*command, "--route", "adjoint", "--route", "complex-step", "--min-time", "30"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+    )  # fmt: skip
+    store = tmp_path / "results" / "routes.sqlite"
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and not (store.exists() and count(store) >= 3):
+        time.sleep(0.05)
+    child.send_signal(2)
+    out, err = child.communicate(timeout=30)
+    assert child.returncode == 130, err
+    assert "Traceback" not in err
+    assert err.startswith("routes: interrupted")
+    assert count(store) == 3
+    assert out.count("complex-step") == 1
+    assert out.count("adjoint") == 2
+
+
+def count(store: Path) -> int:
+    try:
+        with sqlite3.connect(store) as db:
+            return int(db.execute("SELECT count(*) FROM cases").fetchone()[0])
+    except sqlite3.OperationalError:  # not created yet
+        return 0

@@ -1,0 +1,82 @@
+"""What the documents say is what the code does: every block of README and CONTRIBUTING is executed."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from conftest import ROOT, shell
+
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"(?<![\w.=\[-])[-+]?\d[\d.]*(e[-+]?\d+)?( (B|KiB|MiB|GiB|us|ms|s|min|h|d|y)\b)?")
+
+
+def blocks(document: str, language: str) -> list[str]:
+    found = [body for kind, body in BLOCK.findall((ROOT / document).read_text()) if kind == language]
+    assert found, f"{document} has no {language} block: nothing would be tested"
+    return found
+
+
+def shape(text: str) -> list[list[str]]:
+    """A printed text without what changes from run to run: numbers, and the width of columns."""
+    return [NUMBER.sub("#", line).split() for line in text.splitlines() if line.strip()]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    return tmp_path
+
+
+@pytest.mark.parametrize("block", blocks("README.md", "console"), ids=lambda block: block.splitlines()[0][2:40])
+def test_the_tour_prints_what_the_readme_shows(block: str, folder: Path) -> None:
+    command, _, shown = block.partition("\n")
+    done = shell(command.removeprefix("$ "), folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert shape(done.stdout) == shape(shown)
+
+
+def test_the_other_commands_of_the_readme_run(folder: Path) -> None:
+    for block in blocks("README.md", "sh"):
+        done = shell(f"set -e\n{block}", folder)
+        assert (done.returncode, done.stderr) == (0, "")
+    assert (folder / "cases.csv").stat().st_size > 0 < (folder / "samples.parquet").stat().st_size
+
+
+@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])
+def test_python_blocks_run_one_after_the_other(document: str) -> None:
+    space: dict = {}
+    for block in blocks(document, "python"):
+        exec(compile(block, document, "exec"), space)
+
+
+def test_the_two_commands_exist_and_do_what_the_readme_says(folder: Path) -> None:
+    (first,) = [b for b in blocks("README.md", "") if "make demo" in b]
+    for line in first.splitlines():
+        target = line.split()[1]
+        dry = shell(f"make --dry-run --always-make {target}", ROOT)
+        assert dry.returncode == 0, dry.stderr
+        for step in (
+            "-m venv .venv",
+            "pip install",
+            "routes run --problem bar --route all" if target == "demo" else "pytest",
+        ):
+            assert step in dry.stdout
+
+
+def test_make_lists_its_targets() -> None:
+    listed = shell("make", ROOT).stdout
+    for target in "help demo test lint type benchmark reports clean".split():
+        assert re.search(rf"^{target} ", listed, re.MULTILINE), target
+
+
+def test_no_document_points_nowhere() -> None:
+    for document in ("README.md", "CONTRIBUTING.md"):
+        text = (ROOT / document).read_text()
+        paths = re.findall(r"\]\(([^)#:]+)\)", text) + re.findall(
+            r"`((?:bench|routes|problems|tests|examples)/[\w./]+)`", text
+        )
+        assert paths
+        assert not [path for path in paths if not (ROOT / path).exists()]

@@ -1,0 +1,72 @@
+"""A third party's problem and route, installed by pip, found by entry point; a broken one says why."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT, shell
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the example plug-in installed, and beside it one that cannot be imported."""
+    site = tmp_path_factory.mktemp("site")
+    source = tmp_path_factory.mktemp("source") / "plugin"
+    subprocess.run(["cp", "-r", str(ROOT / "examples" / "plugin"), str(source)], check=True)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    subprocess.run([*pip, "--no-build-isolation", "--target", str(site), str(source)], check=True)
+    info = site / "broken-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[gradient_routes.problems]\nsunk = sunk.problem:Sunk\n[gradient_routes.routes]\nnone = math:pi\n"
+    )
+    return site
+
+
+def routes(site: Path, arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return shell(f"routes {arguments}", cwd, PYTHONPATH=str(site))
+
+
+def test_plugins_are_listed_with_their_origin_and_the_broken_with_the_reason(site: Path, tmp_path: Path) -> None:
+    done = routes(site, "list", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "duffing  (from gradient-routes-duffing)" in done.stdout
+    assert "fd-extrapolated  (from gradient-routes-duffing)" in done.stdout
+    assert "'sunk' of broken cannot be imported: ModuleNotFoundError: No module named 'sunk'" in done.stdout
+    assert "'none' of broken is no Route" in done.stdout
+
+
+def test_plugins_run_beside_the_built_ins(site: Path, tmp_path: Path) -> None:
+    done = routes(site, "run --json --problem bar --problem duffing --route all --min-time 0", tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = {(r["problem"], r["route"]): r for r in map(json.loads, done.stdout.splitlines())}
+    assert len(rows) == 2 * 8
+    for (problem, route), row in rows.items():
+        if problem == "duffing" and route in ("unrolled-ad", "implicit-ad"):
+            assert row["status"] == "skipped"
+            assert "jax.numpy" in row["reason"]
+            continue
+        assert row["status"] == "ok"
+        assert row["work"] == row["predicted_work"]
+        assert row["gradient_error"] < {"fd-one-sided": 1e-5, "fd-central": 1e-8}.get(route, 1e-10)
+    # no closed form there: another exact route judges, never the one being judged
+    assert rows["duffing", "adjoint"]["reference"] == "complex-step"
+    assert rows["duffing", "complex-step"]["reference"] == "tangent"
+
+
+def test_a_broken_plugin_is_one_line(site: Path, tmp_path: Path) -> None:
+    done = routes(site, "run --problem sunk --route adjoint", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("routes: problem 'sunk' of broken cannot be imported")
+    assert done.stderr.count("\n") == 1
+
+
+def test_the_example_is_as_short_as_promised() -> None:
+    lengths = {p.name: len(p.read_text().splitlines()) for p in (ROOT / "examples" / "plugin" / "duffing").glob("*.py")}
+    assert lengths["problem.py"] <= 65
+    assert lengths["route.py"] <= 42

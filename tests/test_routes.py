@@ -1,0 +1,214 @@
+"""Laws of every route on every problem: right, at the declared price, zero where no datum looks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from conftest import EXACT, OPTIONS, ROUTES, relative_error, somewhere, zoo
+
+from bench.accuracy import error
+from problems.bar import Bar
+from problems.errors import DomainError, InputError, NotConverged
+from problems.problem import Array, Problem, Reference
+from routes.adjoint import adjoint
+from routes.complex_step import complex_step
+from routes.finite_difference import fd_central, fd_one_sided
+from routes.implicit_ad import implicit_ad
+from routes.model import Model
+from routes.newton import ForwardWork, Solver
+from routes.route import Result, Route
+from routes.tally import Work
+from routes.tangent import tangent
+from routes.unrolled_ad import unrolled_ad
+
+ZOO = zoo()
+ACCURACY = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "unrolled-ad": 1e-9}  # the others: 1e-12
+
+
+def pairs(routes: tuple[Route, ...] = ROUTES) -> Iterator[tuple[str, Route, dict]]:
+    for name, problem in ZOO.items():
+        for route in routes:
+            for options in OPTIONS.get(route.name, [{}]):
+                if route.objection(problem, **options) is None:
+                    yield name, route, options
+
+
+def ids(value: object) -> str | None:
+    if isinstance(value, Route):
+        return value.name
+    return ",".join(str(v) for v in value.values() if v is not None) or "-" if isinstance(value, dict) else None
+
+
+def differentiate(route: Route, problem: Problem, p: Array, **options) -> tuple[Result, Work, Work]:
+    """The result, the work counted and the work declared."""
+    model = Model(problem)
+    options = route.resolve(model, p, **options)
+    gradient = route.prepare(model, p, **options)
+    before = model.tally.work
+    result = gradient(p)
+    counted = model.tally.work - before
+    state = Model(problem).solve(p)
+    declared = route.cost(len(p), ForwardWork(len(state.history) - 1, problem.linear, model.solver.rtol), **options)
+    return result, counted, declared
+
+
+def reference(problem: Problem, p: Array) -> Reference:
+    """The closed form, or dense algebra with derivatives of R by complex steps where there is none."""
+    own = problem.reference(p)
+    if own is not None:
+        return own
+    u, h = Model(problem).solve(p).u, 1e-30
+    n_u, n_p = len(u), len(p)
+    R = problem.residual
+    R_u = np.column_stack([R(u + 1j * h * e, p + 0j).imag / h for e in np.eye(n_u)])
+    R_p = np.column_stack([R(u + 0j, p + 1j * h * e).imag / h for e in np.eye(n_p)])
+    J_u = np.array([problem.objective(u + 1j * h * e, p).imag / h for e in np.eye(n_u)])
+    J_p = np.array([np.imag(problem.objective(u, p + 1j * h * e)) / h for e in np.eye(n_p)])
+    g = J_p - R_p.T @ np.linalg.solve(R_u.T, J_u)
+    return Reference("dense algebra", g, float(np.linalg.norm(g)))
+
+
+@pytest.mark.parametrize(("name", "route", "options"), list(pairs()), ids=ids)
+def test_every_route_gives_the_gradient(name: str, route: Route, options: dict) -> None:
+    problem = ZOO[name]
+    p = somewhere(problem)
+    result, _, _ = differentiate(route, problem, p, **options)
+    assert error(result.gradient, reference(problem, p))[0] < ACCURACY.get(route.name, 1e-12)
+    J = Model(problem).value(p)
+    assert result.J is None or result.J == pytest.approx(J, rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "route", "options"), list(pairs()), ids=ids)
+def test_counted_work_is_the_declared_work(name: str, route: Route, options: dict) -> None:
+    problem = ZOO[name]
+    _, counted, declared = differentiate(route, problem, problem.parameters.start, **options)
+    assert counted == declared
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 33, 200])
+@pytest.mark.parametrize("route", ROUTES, ids=ids)
+def test_declared_work_holds_for_every_size(route: Route, n: int) -> None:
+    for options in OPTIONS.get(route.name, [{}])[: 1 if route is unrolled_ad and n > 5 else None]:
+        _, counted, declared = differentiate(route, Bar(n=n), np.zeros(n), **options)
+        assert counted == declared
+
+
+def test_the_table_of_bills() -> None:
+    """The formulas users choose by, literally."""
+    forward, n = ForwardWork(k=1), 10
+    assert fd_one_sided.cost(n, forward, step=None, start="cold").forward_solves == n + 1
+    assert fd_central.cost(n, forward, step=None, start="cold").forward_solves == 2 * n
+    assert fd_central.cost(n, forward, step=None, start="chord").factorizations == 1
+    assert complex_step.cost(n, forward).forward_solves == n
+    assert tangent.cost(n, forward) == forward.cold() + Work(solves=n)
+    assert adjoint.cost(n, forward) == implicit_ad.cost(n, forward) == forward.cold() + Work(transposed_solves=1)
+    assert unrolled_ad.cost(n, forward, inner="cg", iterations=7).matvecs == 14
+
+
+@pytest.mark.parametrize("n", [8, 10_000])
+@pytest.mark.parametrize("parametrization", ["log", "raw"])
+@pytest.mark.parametrize("route", [tangent, adjoint, implicit_ad], ids=ids)
+def test_the_blind_tail_is_exactly_zero(route: Route, parametrization: str, n: int) -> None:
+    if route is tangent and n > 1000:
+        n = 300
+    bar = Bar(n=n, sensors=[2, 5], parametrization=parametrization)
+    result, _, _ = differentiate(route, bar, somewhere(bar))
+    assert not result.gradient[5:].any()
+    assert result.gradient[:5].all()
+
+
+@pytest.mark.parametrize("route", ROUTES, ids=ids)
+def test_no_sensors_no_gradient(route: Route) -> None:
+    bar = Bar(sensors=0)
+    result, _, _ = differentiate(route, bar, somewhere(bar), **OPTIONS.get(route.name, [{}])[0])
+    assert not result.gradient.any()
+    assert "exactly 0" in bar.notes[0]
+
+
+@pytest.mark.parametrize(("name", "route", "options"), list(pairs(EXACT)), ids=ids)
+def test_taylor_remainders_fall_with_rate_two(name: str, route: Route, options: dict) -> None:
+    """|J(p + h v) - J(p) - h g.v| = O(h^2), in a random direction."""
+    problem = ZOO[name]
+    p = somewhere(problem)
+    v = np.random.default_rng(5).standard_normal(len(p))
+    result, _, _ = differentiate(route, problem, p, **options)
+    h = 0.02 / 2.0 ** np.arange(5)
+    J = Model(problem).value
+    remainders = np.array([abs(J(p + k * v) - J(p) - k * (result.gradient @ v)) for k in h])
+    assert (np.log2(remainders[:-1] / remainders[1:]) > 1.9).all()
+
+
+@pytest.mark.parametrize("name", ZOO)
+def test_tangent_and_adjoint_give_one_number(name: str) -> None:
+    """J_u.du for R_u du = -R_p v equals (R_p^T lam).v for R_u^T lam = -J_u."""
+    problem = ZOO[name]
+    model, p = Model(problem), somewhere(problem)
+    state = model.solve(p)
+    lin, factors = model.linearize(state), model.factors_at(state)
+    v = np.random.default_rng(6).standard_normal(len(p))
+    du = model.solve_linear(factors, -(lin.R_p @ v))
+    lam = model.solve_transposed(factors, -lin.J_u)
+    assert lin.J_u @ du == pytest.approx((lin.R_p.T @ lam) @ v, rel=1e-12, abs=1e-15)
+
+
+def test_the_adjoint_gradient_is_a_product_of_strains() -> None:
+    bar = Bar()
+    p = somewhere(bar)
+    result, _, _ = differentiate(adjoint, bar, p)
+    view = bar.view(p, result.u, result.lam)
+    np.testing.assert_allclose(view.columns["A L_e eps[u] eps[lam]"] * np.exp(p), result.gradient, rtol=1e-14)
+    assert view.blind.tolist() == [False] * 5 + [True] * 3
+
+
+@pytest.mark.parametrize(("sensors", "tolerance"), [(5, 1e-12), (10**6, 10**6 * np.finfo(float).eps)])
+def test_a_million_moduli_against_the_closed_form(sensors: int, tolerance: float) -> None:
+    """Strains are differences of displacements: far from the clamp they keep eps N relative, whoever computes them."""
+    bar = Bar(n=10**6, sensors=sensors, noise=1e-3)
+    p = 0.3 * np.random.default_rng(0).standard_normal(10**6)
+    result, counted, declared = differentiate(adjoint, bar, p)
+    assert error(result.gradient, bar.reference(p))[0] < tolerance
+    assert counted == declared
+
+
+def test_stale_factors_would_be_seen() -> None:
+    """The last Newton factors belong to the iterate before: used as they are, they corrupt the gradient."""
+    problem = ZOO["duffing"]
+    model, p = Model(problem, Solver(rtol=1e-6)), problem.parameters.start
+    state = model.solve(p)
+    lin = model.linearize(state)
+    stale = lin.R_p.T @ model.solve_transposed(state.factors, -lin.J_u)
+    fresh = lin.R_p.T @ model.solve_transposed(model.factors_at(state), -lin.J_u)
+    right = reference(problem, p).gradient
+    assert relative_error(stale, right) > 1e-6 > relative_error(fresh, right)
+
+
+def test_steps_that_leave_the_domain_are_refused_with_the_bound() -> None:
+    bar = Bar(parametrization="raw")
+    p = np.where(np.arange(8) == 3, 1e-7, 1.0)
+    with pytest.raises(DomainError, match=r"fd-central: the step .* from E_4 = 1e-07 passes its bound 0 - choose"):
+        differentiate(fd_central, bar, p, step=None, start="cold")
+    differentiate(fd_one_sided, bar, p, step=None, start="cold")  # forward is free
+    log = Bar()
+    with pytest.raises(DomainError, match="passes its bound 300"):
+        differentiate(fd_one_sided, log, np.full(8, 299.9), step=1e-2, start="cold")
+    with pytest.raises(DomainError, match="does not change"):
+        differentiate(fd_one_sided, log, np.ones(8), step=1e-17, start="cold")
+
+
+@pytest.mark.parametrize("step", [0.0, -1e-6, np.nan, np.inf])
+def test_steps_that_are_none_are_wrong_usage(step: float) -> None:
+    with pytest.raises(InputError, match="finite and > 0"):
+        fd_central.check(step=step, start="cold")
+
+
+def test_a_solve_that_does_not_converge_says_how_far_it_came() -> None:
+    problem = ZOO["duffing"]
+    with pytest.raises(NotConverged, match=r"duffing: not converged: .* after 2 steps") as caught:
+        Model(problem, Solver(max_steps=2)).solve(problem.parameters.start)
+    assert len(caught.value.history) == 3
+
+
+def test_a_route_without_what_it_needs_says_what_is_missing() -> None:
+    assert "R and J written in jax.numpy, which duffing does not offer" in str(implicit_ad.objection(ZOO["duffing"]))

@@ -1,0 +1,171 @@
+"""The store: kept, exported, survives kills, shared by writers, refuses what is not its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from conftest import ROOT, shell
+
+from bench.rows import COLUMNS, SAMPLES, STORED, empty_row
+from bench.store import SCHEMA, Store
+from bench.timing import Samples
+from bench.views.schema import markdown
+from problems.errors import InputError
+from routes.tally import KINDS
+
+RUN = ("run", "--problem", "bar[n=1|2]", "--route", "adjoint", "--route", "tangent", "--min-time", "0.01")
+
+
+def row(**values):
+    return empty_row() | {"problem": "bar", "route": "adjoint", "status": "ok"} | values
+
+
+def test_rows_come_back_as_they_went_in(tmp_path: Path) -> None:
+    store = Store(tmp_path / "s.sqlite")
+    work = {kind: i for i, kind in enumerate(KINDS)}
+    kept = row(
+        problem_options={"n": 8}, gradient=[0.1, -0.0, 1e-300], work=work, predicted_work=None, objective=0.1 + 0.2
+    )
+    store.append(kept, Samples((0.1, 0.2), (0.3, 0.4)))
+    assert store.rows() == [kept]
+    names, samples = store.table("samples")
+    assert names == [c.name for c in SAMPLES]
+    assert samples == [
+        (1, "gradient", 0, 0.1),
+        (1, "gradient", 1, 0.2),
+        (1, "forward", 0, 0.3),
+        (1, "forward", 1, 0.4),
+    ]
+
+
+def test_not_a_number_is_absent_and_huge_counts_are_kept(tmp_path: Path) -> None:
+    store = Store(tmp_path / "s.sqlite")
+    store.append(row(objective=float("nan"), gradient_error=float("inf"), predicted_tape_bytes=2**80), None)
+    (back,) = store.rows()
+    assert (back["objective"], back["gradient_error"]) == (None, None)
+    assert back["predicted_tape_bytes"] == 2.0**80
+
+
+def test_the_store_is_append_only_and_counts_up(cli) -> None:
+    cli(*RUN)
+    first = Store("results/routes.sqlite").table("cases")[1]
+    cli(*RUN)
+    assert Store("results/routes.sqlite").table("cases")[1][: len(first)] == first
+    assert [r[0] for r in Store("results/routes.sqlite").table("cases")[1]] == list(range(1, 9))
+
+
+def test_no_store_keeps_nothing(cli, tmp_path: Path) -> None:
+    assert cli(*RUN, "--no-store").code == 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_exports_hold_the_same_numbers_in_every_format(cli, tmp_path: Path) -> None:
+    ran = cli(*RUN, "--json")
+    frames = {}
+    for format, read in (("csv", pd.read_csv), ("parquet", pd.read_parquet), ("json", pd.read_json)):
+        assert cli("export", "--table", "cases", "--format", format, "-o", f"cases.{format}").code == 0
+        frames[format] = read(tmp_path / f"cases.{format}")
+    for frame in frames.values():
+        assert list(frame["gradient_norm"]) == pytest.approx([r["gradient_norm"] for r in ran.rows], rel=1e-14)
+        assert list(frame["work_solves"]) == [r["work"]["solves"] for r in ran.rows]
+        assert {c.name for c in STORED} <= set(frame.columns)
+    assert cli("export", "--table", "samples").out.startswith("case_id,kind,round,seconds\n")
+    (environment,) = json.loads(cli("export", "--table", "environments", "--format", "json").out)
+    assert environment["cores"] == os.cpu_count()
+    assert json.loads(environment["versions"])["numpy"]
+
+
+def test_export_to_where_one_cannot_write(cli) -> None:
+    cli(*RUN)
+    ran = cli("export", "-o", "nowhere/x.csv")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+
+
+def test_report_prints_what_was_kept(cli) -> None:
+    cli(*RUN)
+    out = cli("report").out
+    assert "bar[n=1]" in out
+    assert out.count("adjoint") == 2
+
+
+def is_one_line(error: pytest.ExceptionInfo[InputError], says: str) -> bool:
+    text = str(error.value)
+    return says in text and "\n" not in text and " - " in text
+
+
+def test_stores_that_are_none_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("this is no database, but it is long enough to have a header to look at")
+    with sqlite3.connect(tmp_path / "other") as db:
+        db.execute("CREATE TABLE songs (title TEXT)")
+    for path, says in ((tmp_path, "directory"), (tmp_path / "text", "not a database"), (tmp_path / "other", "another")):
+        with pytest.raises(InputError) as error:
+            Store(path).check_writable()
+        assert is_one_line(error, says)
+    with pytest.raises(InputError) as error:
+        Store(tmp_path / "text" / "below.sqlite").check_writable()
+    assert is_one_line(error, "text")
+
+
+def test_a_newer_schema_is_refused(tmp_path: Path) -> None:
+    store = Store(tmp_path / "s.sqlite")
+    store.check_writable()
+    with sqlite3.connect(store.path) as db:
+        db.execute(f"PRAGMA user_version = {SCHEMA + 1}")
+    for use in (store.check_writable, store.rows):
+        with pytest.raises(InputError, match=f"schema {SCHEMA + 1}"):
+            use()
+
+
+def test_a_store_that_cannot_be_written_is_refused_before_anything_runs(cli) -> None:
+    ran = cli(*RUN, "--store", "/proc/routes.sqlite")  # not even root may write there
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.count("\n") == 1
+
+
+def test_two_processes_write_at_once(tmp_path: Path) -> None:
+    command = [str(Path(sys.executable).with_name("routes")), *RUN]
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    children = [subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) for _ in range(4)]
+    assert [child.communicate(timeout=60)[1] for child in children] == [""] * 4
+    assert [child.returncode for child in children] == [0] * 4
+    assert len(Store(tmp_path / "results" / "routes.sqlite").rows()) == 16
+
+
+@pytest.mark.parametrize("after", [0.4, 0.7, 1.0, 1.3])
+def test_a_kill_loses_at_most_the_case_in_flight(tmp_path: Path, after: float) -> None:
+    """Every row that was printed was kept before."""
+    command = [str(Path(sys.executable).with_name("routes")), "run", "--json", "--problem", "bar[n=1|2|3|4|5|6|7|8]"]
+    with open(tmp_path / "out", "w") as out:
+        child = subprocess.Popen([*command, "--route", "adjoint", "--route", "tangent"], cwd=tmp_path, stdout=out)
+        time.sleep(after)
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+    printed = [json.loads(line) for line in (tmp_path / "out").read_text().splitlines(keepends=True) if "\n" in line]
+    store = Store(tmp_path / "results" / "routes.sqlite")
+    kept = store.rows() if store.path.exists() and store.path.stat().st_size else []
+    assert kept[: len(printed)] == printed
+    assert len(kept) <= len(printed) + 1
+    store.append(row(), None)  # and it opens again
+    assert len(store.rows()) == len(kept) + 1
+
+
+def test_every_column_is_documented() -> None:
+    assert (ROOT / "results" / "README.md").read_text() == markdown(), (
+        "run python -m bench.views.schema > results/README.md"
+    )
+    assert all(column.meaning for column in (*COLUMNS, *STORED, *SAMPLES))
+
+
+def test_the_shell_sees_the_same(tmp_path: Path) -> None:
+    done = shell("routes run --problem bar --route adjoint && routes export --format parquet | wc -c", tmp_path)
+    assert done.returncode == 0
+    assert int(done.stdout.split()[-1]) > 1000

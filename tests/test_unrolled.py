@@ -1,0 +1,91 @@
+"""Unrolled AD: the gradient of the k-th iterate, its tape, and no NaN beyond convergence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import relative_error, somewhere
+
+from problems.bar import Bar
+from problems.errors import InputError
+from routes.iterations import iteration
+from routes.model import Model
+from routes.unrolled_ad import KEPT, unrolled_ad
+
+INNER = tuple(KEPT)
+
+
+@pytest.mark.parametrize("k", [1, 3, 6])
+@pytest.mark.parametrize("inner", INNER)
+def test_it_is_the_gradient_of_the_kth_iterate(inner: str, k: int) -> None:
+    """Equal to central differences of the k-step objective, and not the gradient of the solution."""
+    bar = Bar(n=6, sensors=6)
+    p = somewhere(bar)
+    iterate, traced = iteration(inner, bar.traced(), 6), bar.traced()
+    result = unrolled_ad.prepare(Model(bar), p, inner=inner, iterations=k)(p)
+
+    def J_k(p: np.ndarray) -> float:
+        return float(traced.objective(iterate.iterate(p, k), p))
+
+    h = 1e-5
+    fd = np.array([(J_k(p + h * e) - J_k(p - h * e)) / (2 * h) for e in np.eye(6)])
+    assert relative_error(result.gradient, fd) < 1e-7  # h^2, and eps J / h
+    assert result.J == pytest.approx(J_k(p), rel=1e-12)
+    converged = inner == "cg" and k == 6  # conjugate gradients end after n_u steps
+    assert (relative_error(result.gradient, bar.reference(p).gradient) < 1e-9) == converged
+    assert (result.residual < 1e-10) == converged
+
+
+@pytest.mark.parametrize("inner", INNER)
+def test_the_iterate_is_the_textbook_one(inner: str) -> None:
+    bar = Bar(n=5, sensors=5)
+    p = somewhere(bar)
+    K = np.column_stack([bar.tangent(p, p) @ e for e in np.eye(5)])
+    u, r, d = np.zeros(5), bar.f.copy(), bar.f.copy()
+    for _ in range(3):
+        if inner == "cg":
+            alpha = r @ r / (d @ K @ d)
+            u, r_next = u + alpha * d, r - alpha * K @ d
+            d, r = r_next + (r_next @ r_next) / (r @ r) * d, r_next
+        else:
+            w = 1 / np.diag(K) if inner == "jacobi" else 1 / float(bar.traced().spectral_bound(p))
+            u = u + w * (bar.f - K @ u)
+    np.testing.assert_allclose(iteration(inner, bar.traced(), 5).iterate(p, 3), u, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("beyond", [1, 2, 10, 200])
+@pytest.mark.parametrize("start", ["start", "somewhere"])
+def test_conjugate_gradients_stand_still_after_convergence(start: str, beyond: int) -> None:
+    bar = Bar(n=8)
+    p = bar.parameters.start if start == "start" else somewhere(bar)
+    result = unrolled_ad.prepare(Model(bar), p, inner="cg", iterations=8 + beyond)(p)
+    assert relative_error(result.gradient, bar.reference(p).gradient) < 1e-10
+
+
+@pytest.mark.parametrize("inner", INNER)
+def test_default_iterations_are_what_the_tolerance_needs(inner: str) -> None:
+    bar = Bar(n=6)
+    p, model = somewhere(bar), Model(bar)
+    k = unrolled_ad.resolve(model, p, inner=inner, iterations=None)["iterations"]
+    enough = unrolled_ad.prepare(model, p, inner=inner, iterations=k)(p)
+    short = unrolled_ad.prepare(model, p, inner=inner, iterations=k - 1)(p)
+    assert enough.residual <= 2 * model.solver.rtol < 20 * short.residual  # 2: the residual carried along drifts
+    assert short.residual > model.solver.rtol
+    expected = unrolled_ad.expect(model, p, inner=inner, iterations=None)["iterations"]
+    assert k / 5 < expected < 5 * k  # an estimate for a bill: Jacobi hardly feels the contrast it includes
+
+
+@pytest.mark.parametrize("inner", INNER)
+def test_the_tape_is_as_large_as_declared(inner: str) -> None:
+    bar = Bar(n=500)
+    p = bar.parameters.start
+    tapes = [unrolled_ad.prepare(Model(bar), p, inner=inner, iterations=k)(p).tape for k in (20, 40)]
+    declared = unrolled_ad.tape(bar, inner=inner, iterations=20)
+    assert tapes[1] - tapes[0] == declared  # bytes of 20 iterations, exactly; the rest does not grow
+    assert tapes[0] - declared < 10 * 8 * 500
+
+
+def test_wrong_iterations_are_wrong_usage() -> None:
+    for k in (0, -5):
+        with pytest.raises(InputError, match="choose at least 1"):
+            unrolled_ad.check(inner="cg", iterations=k)
