@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from bench import registry
-from problems.problem import Array, Problem, Reference
+from problems.errors import RoutesError
+from problems.problem import Array, Reference
 from routes.model import Model
 from routes.route import Route
 
@@ -13,17 +16,40 @@ JUDGES = ("complex-step", "tangent")  # where a problem knows no closed form; ne
 MANY = 200  # parameters; beyond, these cost too much to be run unasked
 
 
-def reference_for(problem: Problem, p: Array, route: Route) -> Reference | None:
-    """The problem's own reference, or else the gradient of another exact route where n_p is small, or None."""
-    own = problem.reference(p)
-    if own is not None or len(p) > MANY:
-        return own
-    for name in JUDGES:
-        judge: Route = registry.find("route", name).load()
-        if name != route.name and judge.objection(problem) is None:
-            gradient = judge.prepare(Model(problem), p)(p).gradient
-            return Reference(name, gradient, float(np.linalg.norm(gradient)))
-    return None
+class Judges:
+    """References for one problem at one p, each computed once, when first asked for.
+
+    `unaffordable` says of a route why its bill is not paid, or None.
+    """
+
+    def __init__(self, model: Model, p: Array, unaffordable: Callable[[Route], str | None]) -> None:
+        self.model, self.p, self.unaffordable = model, p, unaffordable
+        self._own: Reference | None = None
+        self._asked = False
+        self._gradients: dict[str, Reference | None] = {}
+
+    def judge(self, route: Route) -> Reference | None:
+        """The problem's own reference, or another exact route's gradient where n_p is small, or None."""
+        if not self._asked:
+            self._own, self._asked = self.model.problem.reference(self.p), True
+        if self._own is not None or len(self.p) > MANY:
+            return self._own
+        for name in JUDGES:
+            if name != route.name:
+                if name not in self._gradients:
+                    self._gradients[name] = self._gradient(registry.find("route", name).load())
+                if self._gradients[name] is not None:
+                    return self._gradients[name]
+        return None
+
+    def _gradient(self, route: Route) -> Reference | None:
+        if route.objection(self.model.problem) is not None or self.unaffordable(route) is not None:
+            return None
+        try:
+            gradient = route.prepare(self.model, self.p)(self.p).gradient
+        except RoutesError:  # a judge that fails is no reason to fail the judged
+            return None
+        return Reference(route.name, gradient, float(np.linalg.norm(gradient)))
 
 
 def error(gradient: Array, reference: Reference) -> tuple[float, str]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
+from typing import Any
 
 from bench.memory import available_bytes
 from bench.timing import seconds_of
-from problems.problem import Array, Offers, Problem
+from problems.problem import Array, Offers
 from routes.model import Model
 from routes.newton import ForwardWork, State
 from routes.tally import Work
 
-REPEATS = 3  # the first call of anything is slow
+REPEATS, SHORT = 3, 0.1  # the first call of anything is slow: repeat calls that take less than SHORT seconds
 
 
 @dataclass(frozen=True)
@@ -30,28 +32,34 @@ class Prices:
         return work.forward_solves * self.forward + substitutions * self.solve + work.matvecs * self.matvec
 
 
-def prices(problem: Problem, p: Array) -> tuple[Prices, State | None]:
+def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
     """Measure the prices at p, and give back the state solved on the way (None for a black box)."""
-    model = Model(problem)
+    problem = model.problem
     if Offers.SOLVE not in problem.offers:
-        seconds = median(seconds_of(lambda: model.value(p))[0] for _ in range(REPEATS))
-        return Prices(seconds, 0.0, 0.0, ForwardWork(k=0)), None
-    solves = [seconds_of(lambda: model.solve(p)) for _ in range(REPEATS)]
-    state: State = solves[-1][1]
+        seconds, _ = price_of(lambda: model.value(p))
+        return Prices(seconds, 0.0, 0.0, ForwardWork(Work(forward_solves=1))), None
+    forward, state = price_of(lambda: model.solve(p))
     R_u = problem.tangent(state.u, p)
-    solve = median(seconds_of(lambda: state.factors.solve(state.u))[0] for _ in range(REPEATS))
-    matvec = median(seconds_of(lambda: R_u @ state.u)[0] for _ in range(REPEATS))
-    declared = ForwardWork(len(state.history) - 1, problem.linear, model.solver.rtol)
-    return Prices(median(seconds for seconds, _ in solves), solve, matvec, declared), state
+    solve, _ = price_of(lambda: state.factors.solve(state.u))
+    matvec, _ = price_of(lambda: R_u @ state.u)
+    return Prices(forward, solve, matvec, ForwardWork(state.work, problem.linear, model.solver.rtol)), state
 
 
-def too_dear(seconds: float, tape: int, work: Work, budget: float) -> str | None:
+def price_of(call: Callable[[], Any]) -> tuple[float, Any]:
+    """Median seconds of a call, repeated where it is short, and what it returned."""
+    seconds, result = seconds_of(call)
+    if seconds < SHORT:
+        seconds = median(seconds_of(call)[0] for _ in range(REPEATS))
+    return seconds, result
+
+
+def unaffordable(seconds: float, tape: float | None, work: Work, budget: float) -> str | None:
     """Why a predicted bill is not paid, in a sentence; None if it is."""
     if seconds > budget:
         return f"predicted bill {duration(seconds)} ({summary(work)}) > --budget {budget:g} s; --budget inf forces it"
     memory = available_bytes()
-    if budget != float("inf") and memory is not None and tape > memory:
-        return f"predicted tape {size(tape)} > {size(memory)} of memory at hand; --budget inf forces it"
+    if budget != float("inf") and memory is not None and (tape or 0) > memory:
+        return f"predicted tape {size(tape or 0)} > {size(memory)} of memory at hand; --budget inf forces it"
     return None
 
 

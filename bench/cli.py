@@ -26,9 +26,13 @@ class Routes(click.Group):
         try:
             return super().invoke(ctx)
         except (InputError, DomainError) as error:
-            if "--debug" in sys.argv:
+            if debugging():
                 raise
             click.echo(f"routes: {error}", err=True)
+            ctx.exit(WRONG_USAGE)
+        except click.UsageError as error:
+            about = error.ctx.command_path if error.ctx else "routes"
+            click.echo(f"routes: {error.format_message()} - see {about} --help", err=True)
             ctx.exit(WRONG_USAGE)
         except KeyboardInterrupt:
             click.echo("routes: interrupted - finished cases are printed, and kept unless --no-store", err=True)
@@ -50,13 +54,18 @@ def main() -> None:
 store_option = click.option(
     "--store", type=click.Path(path_type=Path), default=STORE, show_default=True, help="SQLite file that keeps results."
 )
-debug_option = click.option("--debug", is_flag=True, help="Show tracebacks.")
+debug_option = click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks.")
+
+
+def debugging() -> bool:
+    """Asked before options are parsed, too: an error in them is one to debug."""
+    return "--debug" in sys.argv
 
 
 @main.command("list")
 @click.argument("what", required=False, type=click.Choice(["problems", "routes"]))
 @debug_option
-def list_(what: str | None, debug: bool) -> None:
+def list_(what: str | None) -> None:
     """What exists: problems, routes, their options with defaults, plug-ins that cannot be imported."""
     from bench.views.listing import listing
     from bench.views.tables import console
@@ -70,7 +79,7 @@ def list_(what: str | None, debug: bool) -> None:
 
 SELECTOR = "NAME, NAME[key=value,key=a|b] or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
-BUDGET = "Skip what is predicted to take more seconds, or more memory than there is; inf forces it."
+BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 
 
 @main.command()
@@ -94,11 +103,11 @@ def run(
     as_json: bool,
     store: Path,
     no_store: bool,
-    debug: bool,
 ) -> None:
     """Compute dJ/dp by every route named, on every problem named; say what it cost and how wrong it is.
 
-    Exit code: 0 all ok or skipped, 1 a case failed (its row says why), 2 wrong usage.
+    Exit code: 0 all ok or skipped, 1 a case failed (its row says why), 2 wrong usage,
+    130 interrupted.
     """
     from bench import case
     from bench.rows import as_json as json_line
@@ -126,8 +135,8 @@ def run(
     finally:  # an interrupt leaves what was measured on the screen, too
         if not as_json:
             show([o.row for o in done], [(o.row, o.view) for o in done if o.view is not None])
-    for outcome in done if debug else []:
-        click.echo(outcome.traceback or "", err=True, nl=False)
+    if debugging():
+        click.echo("".join(outcome.traceback or "" for outcome in done), err=True, nl=False)
     if any(outcome.row["status"] == "failed" for outcome in done):
         sys.exit(1)
 
@@ -165,7 +174,7 @@ def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write [stdout].")
 @store_option
 @debug_option
-def export(table: str, format: str, output: Path | None, store: Path, debug: bool) -> None:
+def export(table: str, format: str, output: Path | None, store: Path) -> None:
     """Tables of the store as CSV, Parquet or JSON (one array of row objects)."""
     from bench.export import export as write
     from bench.store import Store
@@ -176,7 +185,7 @@ def export(table: str, format: str, output: Path | None, store: Path, debug: boo
 @main.command()
 @store_option
 @debug_option
-def report(store: Path, debug: bool) -> None:
+def report(store: Path) -> None:
     """The tables of everything the store holds."""
     from bench.store import Store
 

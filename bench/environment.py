@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 LIBRARIES = ("gradient-routes", "numpy", "scipy", "jax", "jaxlib", "scikit-fem", "pandas")
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "XLA_FLAGS")
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "XLA_FLAGS", "JAX_PLATFORMS")
 
 
 @cache
@@ -30,7 +30,7 @@ def environment() -> dict[str, Any]:
         "os": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
         "blas": f"{blas.get('name')} {blas.get('version')}",
-        "threads": {name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ},
+        "threads": _pools() | {name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ},
         "versions": {name: _version(name) for name in LIBRARIES},
     }
 
@@ -38,6 +38,12 @@ def environment() -> dict[str, Any]:
 def fingerprint(environment: dict[str, Any]) -> str:
     """A key that equal environments share."""
     return hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _pools() -> dict[str, int]:
+    from threadpoolctl import threadpool_info
+
+    return {pool["internal_api"]: pool["num_threads"] for pool in threadpool_info()}
 
 
 def _version(name: str) -> str | None:

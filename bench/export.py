@@ -2,30 +2,42 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
+from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED
 from bench.store import Store
 from problems.errors import InputError
+
+DTYPES = {"INTEGER": "Int64", "REAL": "Float64", "TEXT": "string", "TEXT PRIMARY KEY": "string"}
+TYPES = {column.name: column.type for column in (*KEYS, *STORED, *SAMPLES, *ENVIRONMENTS)}
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
     """Write a table of the store as CSV, Parquet or a JSON array of row objects, to a file or to stdout."""
-    import pandas as pd  # half a second that only this verb pays
-
     names, records = store.table(table)
-    frame = pd.DataFrame.from_records(records, columns=names).convert_dtypes()
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
     try:
         with click.open_file(str(output or "-"), "wb") as file:
-            if format == "parquet":
-                frame.to_parquet(file, index=False)
-            elif format == "json":
-                file.write((frame.to_json(orient="records", double_precision=15) + "\n").encode())
+            if format == "json":
+                rows = [dict(zip(names, record, strict=True)) for record in records]
+                file.write((json.dumps(rows, allow_nan=False) + "\n").encode())
+            elif format == "parquet":
+                frame(names, records).to_parquet(file, index=False)
             else:
-                file.write(frame.to_csv(index=False).encode())
+                file.write(frame(names, records).to_csv(index=False).encode())
     except OSError as error:
         raise InputError(f"export: {output}: {error.strerror} - name a file you may write with -o") from error
+
+
+def frame(names: list[str], records: list[tuple[Any, ...]]) -> Any:
+    """A pandas DataFrame whose types are the schema's, whatever the data."""
+    import pandas as pd  # half a second that only these formats pay
+
+    table = pd.DataFrame.from_records(records, columns=names)
+    return table.astype({name: DTYPES[TYPES.get(name, "TEXT")] for name in names})

@@ -8,6 +8,7 @@ declares one option, its type, its default and its help. Nothing is declared twi
 from __future__ import annotations
 
 import inspect
+import math
 import types
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from problems.errors import InputError
 
 @dataclass(frozen=True)
 class Option:
-    """One option: `kinds` are the types (or literals) its value may have, in the order they are tried."""
+    """One option: `kinds` are the types (or literals) its value may have."""
 
     name: str
     kinds: tuple[Any, ...]
@@ -42,7 +43,10 @@ class Option:
 
 def options_of(factory: Callable[..., Any]) -> dict[str, Option]:
     """The options `factory` declares: its keyword-only parameters, by name."""
-    parameters = inspect.signature(factory, eval_str=True).parameters.values()
+    try:
+        parameters = inspect.signature(factory, eval_str=True).parameters.values()
+    except Exception as error:  # annotations of a plug-in are its own code
+        raise InputError(f"{factory!r}: its options cannot be read: {error} - mend its annotations") from error
     return {q.name: _option(q) for q in parameters if q.kind is q.KEYWORD_ONLY}
 
 
@@ -76,7 +80,7 @@ def resolve(factory: Callable[..., Any], given: dict[str, str], who: str) -> dic
 
 def convert(option: Option, text: str, who: str) -> Any:
     """The value `text` stands for. Raises InputError saying what was expected."""
-    for kind in option.kinds:
+    for kind in sorted(option.kinds, key=lambda kind: kind is str):  # text would take everything
         try:
             return _converted(kind, text)
         except ValueError:
@@ -95,14 +99,16 @@ def _converted(kind: Any, text: str) -> Any:
     """Raises ValueError where `text` is no `kind`."""
     if get_origin(kind) is Literal:
         choices = {str(choice): choice for choice in get_args(kind)}
-        return choices[text] if text in choices else _no(text)
+        return choices[text] if text in choices else _refuse(text)
     if kind is int:
         return _whole_number(text)
     if kind is bool:
-        return text.lower() == "true" if text.lower() in ("true", "false") else _no(text)
+        return text.lower() == "true" if text.lower() in ("true", "false") else _refuse(text)
     if kind is type(None):
-        return None if text.lower() == "none" else _no(text)
-    return kind(text) if kind in (float, str) else _no(text)
+        return None if text.lower() == "none" else _refuse(text)
+    if kind is float:
+        return float(text) if math.isfinite(float(text)) else _refuse(text)
+    return text if kind is str else _refuse(text)
 
 
 def _whole_number(text: str) -> int:
@@ -111,8 +117,8 @@ def _whole_number(text: str) -> int:
         return int(text)
     except ValueError:
         number = float(text)
-        return int(number) if abs(number) < 2**53 and number == int(number) else _no(text)
+        return int(number) if abs(number) < 2**53 and number == int(number) else _refuse(text)
 
 
-def _no(text: str) -> Any:
+def _refuse(text: str) -> Any:
     raise ValueError(text)

@@ -44,6 +44,8 @@ class Entry:
             ) from error
         if self.kind == "route" and not isinstance(target, Route):
             raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
+        if self.kind == "problem" and not callable(target):
+            raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
         return target
 
     @property

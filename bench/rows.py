@@ -57,6 +57,11 @@ COLUMNS = (
     Column("started", "TEXT", "UTC", "when the case began, ISO 8601"),
 )
 
+KEYS = (
+    Column("case_id", "INTEGER", "", "counts the cases of this store"),
+    Column("environment_id", "TEXT", "", "of the row in environments"),
+)
+
 SAMPLES = (
     Column("case_id", "INTEGER", "", "id of the row in cases"),
     Column("kind", "TEXT", "", "gradient or forward"),
@@ -73,7 +78,7 @@ ENVIRONMENTS = (
     Column("os", "TEXT", "", "system, release, architecture"),
     Column("python", "TEXT", "", "version of Python"),
     Column("blas", "TEXT", "", "NumPy's BLAS and its version"),
-    Column("threads", "TEXT", "", "environment variables that set thread counts", json=True),
+    Column("threads", "TEXT", "", "threads of every BLAS and OpenMP pool, and the variables that set them", json=True),
     Column("versions", "TEXT", "", "versions of the numerical libraries", json=True),
 )
 
@@ -91,20 +96,23 @@ def empty_row() -> Row:
     return dict.fromkeys((c.name for c in COLUMNS), None)
 
 
-def absent_if_not_finite(value: Any) -> Any:
-    """JSON and SQL have no NaN: what is not a finite number is absent."""
+def clean(value: Any) -> Any:
+    """JSON and SQL have no NaN: what is not a finite number is absent, inside objects, too."""
+    if isinstance(value, dict):
+        return {key: clean(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [clean(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def storable(value: Any) -> Any:
     """SQLite's integers end at 2^63; a predicted count may not."""
-    return float(value) if isinstance(value, int) and value >= 2**63 else absent_if_not_finite(value)
+    return float(value) if isinstance(value, int) and value >= 2**63 else clean(value)
 
 
 def as_json(row: Row) -> str:
     """One JSON object on one line."""
-    clean = {name: absent_if_not_finite(value) for name, value in row.items()}
-    return json.dumps(clean, allow_nan=False)
+    return json.dumps(clean(row), allow_nan=False)
 
 
 def as_record(row: Row) -> tuple[Any, ...]:
@@ -117,7 +125,7 @@ def as_record(row: Row) -> tuple[Any, ...]:
             record.append(None if work is None else storable(work[kind]))
         elif column.json:
             value = row[column.name]
-            record.append(None if value is None else json.dumps(value, allow_nan=False))
+            record.append(None if value is None else json.dumps(clean(value), allow_nan=False))
         else:
             record.append(storable(row[column.name]))
     return tuple(record)
@@ -131,6 +139,6 @@ def from_record(record: dict[str, Any]) -> Row:
             value = record[column.name]
             row[column.name] = json.loads(value) if column.json and value is not None else value
     for prefix, name in WORK_PREFIX.items():
-        work = {kind: record[f"{prefix}_{kind}"] for kind in KINDS}
+        work = {kind: record.get(f"{prefix}_{kind}") for kind in KINDS}
         row[name] = None if None in work.values() else work
     return row

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import datetime
 import traceback
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from bench.accuracy import error, reference_for
-from bench.bill import Prices, prices, too_dear
+from bench.accuracy import Judges, error
+from bench.bill import Prices, prices, unaffordable
 from bench.case import ProblemSpec, RouteSpec, point
 from bench.memory import peak_of
 from bench.rows import Row, empty_row
 from bench.timing import Samples, rounds, seconds_of
-from problems.errors import RoutesError
+from problems.errors import InputError, RoutesError
 from problems.problem import Array, Offers, ParameterView, Reference
 from routes.model import Model
-from routes.newton import State
-from routes.route import Result, Route
+from routes.newton import Solver, State
+from routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
-NO_SILENT_NANS = {"over": "raise", "divide": "raise", "invalid": "raise"}
+LONG = 1.0  # [s] calls that take longer are not repeated: one call is timed and its memory read
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,12 @@ class Settings:
     budget: float = 60.0
     min_time: float = 0.1
     gradient: bool = False
+    solver: Solver = field(default_factory=Solver)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A row, its raw timings, what --gradient shows, and the traceback of an unexpected failure."""
+    """A row, its raw timings, what --gradient shows, and the traceback of a failure."""
 
     row: Row
     samples: Samples | None = None
@@ -63,75 +64,106 @@ class Failure(RoutesError):
 def run(problems: list[ProblemSpec], routes: list[RouteSpec], settings: Settings) -> Iterator[Outcome]:
     """All pairs, problem by problem; each outcome as soon as it is known.
 
-    Problems are built first: InputError and DomainError for what cannot be come before anything is measured.
+    Every problem is built once before: InputError and DomainError for what cannot be come before anything is
+    measured. Then one at a time is held.
     """
-    benches = [Workbench(spec, settings) for spec in problems]
-    return (bench.outcome(route) for bench in benches for route in routes)
+    for spec in problems:
+        Workbench(spec, settings)
+    return (outcome for spec in problems for outcome in Workbench(spec, settings).outcomes(routes))
 
 
 class Workbench:
-    """One problem at one p, with what all its routes share: prices, references."""
+    """One problem at one p, with what all its routes share: prices and references."""
 
     def __init__(self, spec: ProblemSpec, settings: Settings) -> None:
         self.spec, self.settings = spec, settings
-        self.build_s, self.problem = seconds_of(spec)
-        self.p = point(self.problem, settings.at)
-        self._prices: tuple[Prices, State | None] | None = None
-        self._references: dict[str, Reference | None] = {}
+        try:
+            self.build_s, self.problem = seconds_of(spec)
+            self.p = point(self.problem, settings.at)
+        except RoutesError:
+            raise
+        except Exception as error:  # a plug-in may raise anything
+            raise InputError(f"problem '{spec.name}' cannot be built: {_one_line(error)} - see --debug") from error
+        self.judges = Judges(self.model(), self.p, self._unaffordable_judge)
+        self._priced: tuple[Prices, State | None] | Exception | None = None
+
+    def model(self) -> Model:
+        return Model(self.problem, self.settings.solver)
+
+    def outcomes(self, routes: list[RouteSpec]) -> Iterator[Outcome]:
+        return (self.outcome(route) for route in routes)
 
     def outcome(self, spec: RouteSpec) -> Outcome:
-        """Run one route on the problem. Never raises an Exception: what goes wrong becomes a failed row."""
+        """Run one route on the problem. What goes wrong becomes a failed row, and the next case runs."""
         row = empty_row() | {
             "problem": self.spec.name,
             "problem_options": self.spec.options,
             "route": spec.route.name,
             "route_options": spec.options,
             "at": self.settings.at,
-            "n_state": self.problem.n_state,
             "n_param": len(self.p),
-            "note": "; ".join(self.problem.notes) or None,
             "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
         }
         try:
-            with np.errstate(**NO_SILENT_NANS):  # type: ignore[arg-type]
+            row |= {"n_state": self.problem.n_state, "note": "; ".join(self.problem.notes) or None}
+            with np.errstate(all="ignore"):  # every number that is kept is checked to be finite
                 return self._run(spec, row)
         except RoutesError as failure:
             return Outcome(row | {"status": "failed", "reason": str(failure)}, traceback=traceback.format_exc())
-        except Exception as failure:  # a plug-in may raise anything; the other cases still run
-            said = " ".join(str(failure).split()) or "no message"
-            reason = f"{spec.route.name}: {type(failure).__name__}: {said} - see --debug"
+        except Exception as failure:  # a plug-in may raise anything
+            reason = f"{spec.route.name}: {_one_line(failure)} - see --debug"
             return Outcome(row | {"status": "failed", "reason": reason}, traceback=traceback.format_exc())
 
     def _run(self, spec: RouteSpec, row: Row) -> Outcome:
-        route, p = spec.route, self.p
+        route, p, model = spec.route, self.p, self.model()
         objection = route.objection(self.problem, **spec.options)
         if objection is not None:
             return Outcome(row | {"status": "skipped", "reason": objection})
-        prices = self.prices
-        expected = route.expect(Model(self.problem), p, **spec.options)
-        work, tape = route.cost(len(p), prices.declared, **expected), route.tape(self.problem, **expected)
-        row |= {"predicted_s": prices.seconds(work), "predicted_tape_bytes": tape, "predicted_work": asdict(work)}
-        reason = too_dear(row["predicted_s"], tape, work, self.settings.budget)
+        reason = self._predict(route, route.expect(model, p, **spec.options), row)
         if reason is not None:
             return Outcome(row | {"status": "skipped", "reason": reason})
-        return self._measure(spec, row)
-
-    def _measure(self, spec: RouteSpec, row: Row) -> Outcome:
-        route, p, model = spec.route, self.p, Model(self.problem)
-        resolve_s, options = seconds_of(lambda: route.resolve(model, p, **spec.options))
+        resolve_s, options = seconds_of(lambda: route.resolve(model, p, self._affordable(route), **spec.options))
+        reason = self._predict(route, options, row)
+        row["route_options"] = options
+        if reason is not None:
+            return Outcome(row | {"status": "skipped", "reason": reason})
         prepare_s, gradient = seconds_of(lambda: route.prepare(model, p, **options))
-        before = model.tally.work
-        first_s, result = seconds_of(lambda: gradient(p))
+        row["prepare_s"] = self.build_s + resolve_s + prepare_s
+        return self._measure(route, options, gradient, model, row)
+
+    def _predict(self, route: Route, options: Options, row: Row) -> str | None:
+        """Fill in the predicted bill; why it is not paid, or None."""
+        work = route.cost(len(self.p), self.prices.declared, **options)
+        tape = None if route.tape is None else route.tape(self.problem, **options)
         row |= {
-            "route_options": options,
-            "prepare_s": self.build_s + resolve_s + prepare_s,
-            "first_s": first_s,
-            "work": asdict(model.tally.work - before),
-            "predicted_work": asdict(route.cost(len(p), self.prices.declared, **options)),
+            "predicted_s": self.prices.seconds(work),
+            "predicted_tape_bytes": tape,
+            "predicted_work": asdict(work),
         }
+        return unaffordable(row["predicted_s"], tape, work, self.settings.budget)
+
+    def _affordable(self, route: Route) -> Callable[[Options], bool]:
+        return lambda options: self._predict(route, options, {}) is None
+
+    def _unaffordable_judge(self, route: Route) -> str | None:
+        return self._predict(route, route.defaults, {})
+
+    def _measure(self, route: Route, options: Options, gradient: Any, model: Model, row: Row) -> Outcome:
+        before = model.tally.work
+        row["first_s"], result = seconds_of(lambda: gradient(self.p))
+        work = model.tally.work - before
+        declared = replace(self.prices.declared, steps=work.newton_iterations - self._base_iterations)
+        row |= {"work": asdict(work), "predicted_work": asdict(route.cost(len(self.p), declared, **options))}
         self._judge(route, result, row)
-        row["peak_bytes"], row["memory_method"] = peak_of(lambda: gradient(p))
-        samples = rounds(lambda: gradient(p), self._forward(), self.settings.min_time)
+        forward = self._forward()
+        if row["first_s"] < LONG:
+            row["peak_bytes"], row["memory_method"] = peak_of(lambda: gradient(self.p))
+            samples = rounds(lambda: gradient(self.p), forward, self.settings.min_time)
+        else:
+            timed: list[float] = []
+            call = lambda: timed.append(seconds_of(lambda: gradient(self.p))[0])  # noqa: E731
+            row["peak_bytes"], row["memory_method"] = peak_of(call)
+            samples = Samples(tuple(timed), (seconds_of(forward)[0],))
         row |= {
             "seconds": float(np.median(samples.gradient)),
             "seconds_min": min(samples.gradient),
@@ -144,20 +176,21 @@ class Workbench:
 
     def _judge(self, route: Route, result: Result, row: Row) -> None:
         """Fill in J, the gradient and its error; raise Failure for numbers that are none."""
-        g = np.asarray(result.gradient)
+        g = np.asarray(result.gradient, dtype=np.float64)
         if g.shape != self.p.shape:
             raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(self.p)} parameters - mend the route")
         bad = np.flatnonzero(~np.isfinite(g))
         if bad.size:
-            first = self.problem.parameters.label(int(bad[0]))
+            first = f"{self.problem.parameters.label(int(bad[0]))} = {g[bad[0]]}"
             raise Failure(
-                f"{route.name}: {bad.size} of {g.size} components are not finite, first {first} = {g[bad[0]]}"
-                f" ({row['work']['matvecs']} products) - iterate less, or take implicit-ad or adjoint"
+                f"{route.name}: {bad.size} of {g.size} gradient components not finite, first {first} - check p"
             )
         J = result.J
         if J is None:
             J = self.objective()
-            row["note"] = "; ".join(filter(None, [row["note"], "objective from 1 forward solve apart"]))
+            row["note"] = "; ".join(filter(None, [row["note"], f"{route.name}: objective from 1 forward solve apart"]))
+        if not np.isfinite(J):
+            raise Failure(f"{route.name}: J = {J} - check p and the data")
         row |= {
             "objective": float(J),
             "gradient": g.tolist() if g.size <= KEEP_GRADIENT or self.settings.gradient else None,
@@ -165,38 +198,51 @@ class Workbench:
             "residual": result.residual,
             "tape_bytes": result.tape,
         }
-        reference = self.reference(route)
+        reference = self.judges.judge(route)
         if reference is not None:
             row["gradient_error"], row["reference"] = error(g, reference)
 
+    def _price(self) -> tuple[Prices, State | None]:
+        """Prices and the state they were measured on; a forward solve that fails is not tried again."""
+        if self._priced is None:
+            try:
+                self._priced = prices(self.model(), self.p)
+            except Exception as failure:  # raised again, for every route
+                self._priced = failure
+        if isinstance(self._priced, Exception):
+            raise self._priced
+        return self._priced
+
     @property
     def prices(self) -> Prices:
-        return self._priced()[0]
+        return self._price()[0]
+
+    @property
+    def _base_iterations(self) -> int:
+        return self.prices.declared.cold.newton_iterations
 
     def objective(self) -> float:
         """J(p) of the forward solve that set the prices."""
-        state = self._priced()[1]
-        return Model(self.problem).value(self.p) if state is None else float(state.J)
+        state = self._price()[1]
+        return self.model().value(self.p) if state is None else float(state.J)
 
-    def _priced(self) -> tuple[Prices, State | None]:
-        if self._prices is None:
-            self._prices = prices(self.problem, self.p)
-        return self._prices
-
-    def reference(self, route: Route) -> Reference | None:
-        if route.name not in self._references:
-            self._references[route.name] = reference_for(self.problem, self.p, route)
-        return self._references[route.name]
-
-    def _forward(self) -> Any:
-        model = Model(self.problem)
+    def _forward(self) -> Callable[[], Any]:
+        model = self.model()
         solvable = Offers.SOLVE in self.problem.offers
         return (lambda: model.solve(self.p)) if solvable else (lambda: model.value(self.p))
 
     def _view(self, route: Route, result: Result) -> View | None:
         if not self.settings.gradient:
             return None
-        state = self._priced()[1]
-        columns = ParameterView() if state is None else self.problem.view(self.p, state.u, result.lam)
-        labels = [self.problem.parameters.label(i) for i in range(len(self.p))]
-        return View(labels, np.asarray(result.gradient), self.reference(route), columns)
+        state = self._price()[1]
+        u = result.u if result.u is not None or state is None else state.u
+        columns = ParameterView() if u is None else self.problem.view(self.p, u, result.lam)
+        parameters = self.problem.parameters
+        units = [parameters.unit_of(i) for i in range(len(self.p))]
+        labels = [f"{parameters.label(i)} [{unit}]" for i, unit in enumerate(units)]
+        return View(labels, np.asarray(result.gradient), self.judges.judge(route), columns)
+
+
+def _one_line(error: Exception) -> str:
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__

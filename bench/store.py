@@ -18,7 +18,6 @@ from bench.rows import ENVIRONMENTS, SAMPLES, STORED, Row, as_record, from_recor
 from bench.timing import Samples
 from problems.errors import InputError
 
-DEFAULT = Path("results") / "routes.sqlite"
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
 SCHEMA = 1
 PATIENCE = 60.0  # [s] to wait for another writer
@@ -52,7 +51,9 @@ class Store:
         """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
         if not self.path.is_file():
             raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
-        with self._errors(), closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True)) as db:
+        with self._errors(), closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=rw", uri=True)) as db:
+            if not db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+                raise InputError(f"store {self.path}: is empty - run `routes run` first, or name one with --store")
             self._check_kind(db)
             cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
             return [d[0] for d in cursor.description], cursor.fetchall()

@@ -33,6 +33,8 @@ class Bar(Problem):
 
     State u (N,) [m], displacement of nodes 1..N; parameters theta = log E or E itself (N,), E in Pa.
     Elements behind the last sensor carry load but move no sensor: their data gradient is exactly 0.
+    Strains are differences of displacements, so with sensors far from the clamp gradients are good to eps N, not eps:
+    4e-11 at N = 10^6 with a sensor at every node, 1e-16 with five next to the clamp.
     """
 
     name = "bar"
@@ -146,9 +148,11 @@ class Bar(Problem):
         return largest * xp.sum((rows / largest) ** q) ** (1.0 / q)
 
     def reference(self, p: Array) -> Reference:
-        """Closed form, in extended precision: u_k = sum_{e <= k} c_e with the compliances c_e = F L_e / (A E_e), so
+        """Closed form: u_k = sum_{e <= k} c_e with the compliances c_e = F L_e / (A E_e), so
 
         dJ/dE_e = - c_e / E_e sum_{sensors k >= e} (u_k - d_k) + alpha dPhi/dE_e
+
+        Summed in extended precision where the platform has one (x86), so that it is better than what it judges.
         """
         E = self.modulus(p.astype(np.longdouble))
         c = F * np.longdouble(self.L_e) / (A * E)

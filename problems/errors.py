@@ -23,6 +23,10 @@ class SingularMatrix(RoutesError):
     """A matrix that had to be factorized is singular, or not positive definite although it should be."""
 
 
+class Overflow(RoutesError):
+    """A number left float64's range on the way."""
+
+
 class NotConverged(RoutesError):
     """The forward solve did not reach its tolerance.
 

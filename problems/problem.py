@@ -65,20 +65,28 @@ class Parameters:
 
     start        (n_p,) the documented starting point
     scale        (n_p,) > 0, a natural change of p_i: finite differences step by max(|p_i|, scale_i)
-    lower, upper the open interval p_i must lie in
-    unit         of every p_i, for tables
+    lower, upper the open interval p_i must lie in, one number for all or (n_p,)
+    unit         of p_i for tables, one for all or one each
     label        name of component i (counted from 0)
     """
 
     start: Array
     scale: Array
-    lower: float = -np.inf
-    upper: float = np.inf
-    unit: str = "1"
+    lower: Array | float = -np.inf
+    upper: Array | float = np.inf
+    unit: str | tuple[str, ...] = "1"
     label: Callable[[int], str] = default_label
 
     def __len__(self) -> int:
         return len(self.start)
+
+    def bounds(self, i: int) -> tuple[float, float]:
+        """The open interval of component i."""
+        lower, upper = (np.broadcast_to(bound, self.start.shape)[i] for bound in (self.lower, self.upper))
+        return float(lower), float(upper)
+
+    def unit_of(self, i: int) -> str:
+        return self.unit if isinstance(self.unit, str) else self.unit[i]
 
     def check(self, p: Array, who: str) -> Array:
         """Return p as float64 or raise DomainError / InputError naming the first component at fault."""
@@ -88,9 +96,10 @@ class Parameters:
         bad = np.flatnonzero(~((p > self.lower) & (p < self.upper) & np.isfinite(p)))
         if bad.size:
             i = int(bad[0])
+            lower, upper = self.bounds(i)
             more = f" (and {bad.size - 1} more)" if bad.size > 1 else ""
             raise DomainError(
-                f"{who}: {self.label(i)} = {p[i]:g} is outside {self.lower:g} < {self.label(i)} < {self.upper:g}{more}"
+                f"{who}: {self.label(i)} = {p[i]:g} is outside {lower:g} < {self.label(i)} < {upper:g}{more}"
                 " - choose values inside"
             )
         return p
@@ -139,7 +148,7 @@ class Problem:
     name       as in selectors
     parameters what p is
     offers     what the methods below provide; a route needing more is skipped with a reason
-    n_state    n_u, the number of free unknowns
+    n_state    n_u, the number of free unknowns (0 for a black box)
     linear     R is affine in u: one Newton step solves it
     structure  of R_u: "spd", "symmetric" (indefinite) or "general"
     notes      sentences a user should read beside the result
@@ -147,8 +156,8 @@ class Problem:
 
     name: str
     parameters: Parameters
-    offers: Offers
-    n_state: int
+    offers: Offers = Offers.VALUE
+    n_state: int = 0
     linear: bool = False
     structure: Structure = "general"
     notes: tuple[str, ...] = ()

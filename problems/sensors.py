@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,11 +43,14 @@ def parse_nodes(nodes: Nodes, n: int, who: str) -> Array:
     """
     if isinstance(nodes, str):
         nodes = _nodes_from_text(nodes, n, who)
-    if isinstance(nodes, int):
+    if isinstance(nodes, int | np.integer):
         if not 0 <= nodes <= n:
             raise InputError(f"{who}: sensors={nodes} asks for nodes 1..{nodes}, there are {n} - choose 0 to {n}")
         return np.arange(1, nodes + 1)
-    array = np.asarray(nodes, dtype=np.int64)
+    try:
+        array = np.array([operator.index(node) for node in nodes], dtype=np.int64)
+    except TypeError:
+        raise InputError(f"{who}: sensors={nodes} - node numbers are whole") from None
     outside = array[(array < 1) | (array > n)]
     if outside.size:
         raise InputError(f"{who}: sensor at node {outside[0]}, the nodes are 1..{n} - choose one of them")
@@ -81,6 +85,8 @@ def measured(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sensors
     """
     columns = read_columns(path, ("node", "displacement"))
     node, d = columns["node"], columns["displacement"]
+    if not node.size:
+        raise InputError(f"{path}: has a header and no rows - add one row a sensor")
     for line, value in enumerate(node, start=2):
         if value != int(value) or not 1 <= value <= n:
             raise InputError(f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - mend the row")

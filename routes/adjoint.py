@@ -10,7 +10,7 @@ from routes.route import ForwardWork, Offers, Result, Work, route
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return forward.cold() + forward.factors_at_solution() + Work(transposed_solves=1)
+    return forward.cold + forward.factors_at_solution() + Work(transposed_solves=1)
 
 
 @route("adjoint", needs=Offers.LINEARIZE, cost=cost)

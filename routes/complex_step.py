@@ -14,7 +14,7 @@ RELATIVE_STEP = 1e-30  # its square is far below eps, itself far above the small
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return n_p * forward.complex()
+    return n_p * forward.at_complex_p()
 
 
 @route("complex-step", needs=Offers.SOLVE | Offers.COMPLEX, cost=cost)

@@ -1,4 +1,4 @@
-"""Factorizations of R_u, chosen by the matrix' structure. Law: A @ solve(b) == b and A.T @ solve_transposed(b) == b."""
+"""Factorizations of R_u, by the type of the matrix. Law: A @ solve(b) == b, A.T @ solve_transposed(b) == b."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from problems.chain import Chain, cumulative_sum
 from problems.errors import SingularMatrix
 from problems.problem import Array
+from problems.sparse import SymmetricSparse
 
 
 class Factorization(Protocol):
@@ -30,6 +31,8 @@ def factorize(A: Any, who: str) -> Factorization:
     """Factorize A: a Chain, a dense array or a SciPy sparse matrix. Raises SingularMatrix."""
     if isinstance(A, Chain):
         return ChainFactorization(A, who)
+    if isinstance(A, SymmetricSparse):
+        return PardisoFactorization(A, who)
     if isinstance(A, np.ndarray):
         return DenseFactorization(A, who)
     return SparseFactorization(A, who)
@@ -95,3 +98,22 @@ class SparseFactorization:
 
     def solve_transposed(self, b: Array) -> Array:
         return np.asarray(self.lu.solve(b, "T"))
+
+
+class PardisoFactorization:
+    """A = L L^T of MKL PARDISO."""
+
+    def __init__(self, A: SymmetricSparse, who: str) -> None:
+        import pymklpardiso as pardiso
+
+        mtype = pardiso.MTYPE_COMPLEX_SYM if np.iscomplexobj(A.data) else pardiso.MTYPE_REAL_SYM_POSDEF
+        try:
+            self.solver = pardiso.PardisoSolver(A.upper, mtype)
+        except RuntimeError as error:
+            raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check the constraints") from error
+        self.norm = A.norm
+
+    def solve(self, b: Array) -> Array:
+        return np.asarray(self.solver.solve(b))
+
+    solve_transposed = solve

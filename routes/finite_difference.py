@@ -26,28 +26,28 @@ def check(*, step: float | None, start: str) -> None:
         raise InputError(f"finite differences: step={step:g} - a step is finite and > 0")
 
 
-def objects(problem: Problem, *, start: str, **options: Any) -> str | None:
+def missing(problem: Problem, *, start: str, **options: Any) -> str | None:
     if start != "cold" and Offers.SOLVE not in problem.offers:
         return f"start={start} needs R(u, p) and R_u as numbers, which {problem.name} does not offer"
     return None
 
 
 def cost_one_sided(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
-    return forward.cold() + n_p * perturbed(forward, start, step or ONE_SIDED)
+    return forward.cold + perturbed(n_p, forward, start, step or ONE_SIDED)
 
 
 def cost_central(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
-    base = Work() if start == "cold" else forward.cold()
-    return base + (2 * n_p) * perturbed(forward, start, step or CENTRAL)
+    base = Work() if start == "cold" else forward.cold
+    return base + perturbed(2 * n_p, forward, start, step or CENTRAL)
 
 
-def perturbed(forward: ForwardWork, start: str, h: float) -> Work:
+def perturbed(solves: int, forward: ForwardWork, start: str, h: float) -> Work:
     if start == "cold":
-        return forward.cold()
-    return forward.warm(h) if start == "warm" else forward.chord(h)
+        return solves * forward.cold
+    return forward.warm(solves, h) if start == "warm" else forward.chord(solves, h)
 
 
-@route("fd-one-sided", needs=Offers.VALUE, cost=cost_one_sided, check=check, objects=objects)
+@route("fd-one-sided", needs=Offers.VALUE, cost=cost_one_sided, check=check, missing=missing)
 def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p)) / h_i,  h_i = sqrt(eps) max(|p_i|, s_i)."""
     h = steps(model.parameters, p, ONE_SIDED if step is None else step, "fd-one-sided", sides=(1,))
@@ -57,7 +57,7 @@ def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Star
     return Result(J, gradient)
 
 
-@route("fd-central", needs=Offers.VALUE, cost=cost_central, check=check, objects=objects)
+@route("fd-central", needs=Offers.VALUE, cost=cost_central, check=check, missing=missing)
 def fd_central(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p - h_i e_i)) / 2 h_i,  h_i = cbrt(eps) max(|p_i|, s_i)."""
     h = steps(model.parameters, p, CENTRAL if step is None else step, "fd-central", sides=(1, -1))
@@ -79,7 +79,8 @@ def steps(parameters: Parameters, p: Array, relative: float, who: str, sides: tu
         bad = np.flatnonzero((q <= parameters.lower) | (q >= parameters.upper))
         if bad.size:
             i = int(bad[0])
-            name, bound = parameters.label(i), parameters.lower if q[i] <= parameters.lower else parameters.upper
+            name, (lower, upper) = parameters.label(i), parameters.bounds(i)
+            bound = lower if q[i] <= lower else upper
             raise DomainError(
                 f"{who}: the step {side * h[i]:g} from {name} = {p[i]:g} passes its bound {bound:g}"
                 f" - choose step= below {abs(bound - p[i]) / abs(h[i]) * relative:.3g}"

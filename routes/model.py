@@ -69,7 +69,7 @@ class Model:
         return self.solve_linear(factors, R)
 
     def linearize(self, state: State) -> Linearization:
-        """R_p, J_u, J_p at a solved state."""
+        """R_p, J_u, J_p at a solved state: about a residual's worth, and of no kind that is counted."""
         return self.problem.linearize(state.u, state.p)
 
     def solve(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> State:
@@ -78,6 +78,7 @@ class Model:
         p may be complex where the problem offers COMPLEX: the imaginary part, a derivative, converges one Newton
         step behind the real part that is watched, so one more is taken. Raises NotConverged, SingularMatrix.
         """
+        before = self.tally.work
         self.tally.count("forward_solves")
         step = Step(
             residual=lambda u: self.residual(u, p),
@@ -88,11 +89,12 @@ class Model:
         scale = None if start is None else start.scale
         polish = int(np.iscomplexobj(p) and not self.problem.linear)
         u, history, scale, last = newton(step, u, self.solver, self.problem.name, scale, factors, polish)
-        return State(p, u, self.problem.objective(u, p), history, scale, last)
+        J = self.problem.objective(u, p)
+        return State(p, u, J, history, scale, last, self.tally.work - before)
 
     def relative_residual(self, u: Array, p: Array) -> float:
-        """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that was not solved for here; only the first is work."""
-        scale = norm(self.problem.residual(self.problem.initial(p), p))
+        """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that was not solved for here: two residuals."""
+        scale = norm(self.residual(self.problem.initial(p), p))
         return norm(self.residual(u, p)) / (scale or 1.0)
 
     def value(self, p: Array) -> float:

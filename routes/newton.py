@@ -30,7 +30,7 @@ class State:
     """A solved state: u (n_u,) and J at p (n_p,).
 
     factors belong to the last step (for a linear problem: to R_u itself), history holds |R|_inf of every
-    iterate, scale is the |R|_inf that tolerances are relative to.
+    iterate, scale is the |R|_inf that tolerances are relative to, work what the solve took.
     """
 
     p: Array
@@ -39,6 +39,7 @@ class State:
     history: tuple[float, ...]
     scale: float
     factors: Factorization
+    work: Work
 
     @property
     def residual(self) -> float:
@@ -97,33 +98,38 @@ def norm(v: Array) -> float:
 
 @dataclass(frozen=True)
 class ForwardWork:
-    """The declared work of one forward solve that takes k Newton steps, and of perturbed ones.
+    """What declared bills are made of: the work of one cold forward solve, and estimates for perturbed ones.
 
-    A perturbation of relative size h leaves |R| ~ h at the base state. A Newton step squares that, a chord step
-    multiplies it by h; a linear problem takes one Newton step. k = 0 stands for a black box J(p).
+    cold     counted for one solve at the p in question; a black box counts just that one
+    linear   R is affine in u
+    rtol     of the solver
+    steps    Newton and chord steps of all perturbed solves together, once they are known; None estimates them
     """
 
-    k: int
+    cold: Work
     linear: bool = True
     rtol: float = Solver.rtol
+    steps: int | None = None
 
-    def cold(self) -> Work:
-        return self._newton(self.k)
-
-    def complex(self) -> Work:
-        """Cold, at a complex p: see Model.solve."""
-        return self._newton(self.k if self.linear or self.k == 0 else self.k + 1)
+    def at_complex_p(self) -> Work:
+        """A cold solve at a complex p: see Model.solve."""
+        return self.cold if self.linear or not self.cold.newton_iterations else self.cold + self._newton(1)
 
     def factors_at_solution(self) -> Work:
         """See Model.factors_at."""
         return Work() if self.linear else Work(assemblies=1, factorizations=1)
 
-    def warm(self, h: float) -> Work:
-        return self._newton(1 if self.linear else max(1, math.ceil(math.log2(self._decades(h)))))
+    def warm(self, solves: int, h: float) -> Work:
+        """`solves` Newton solves from a state |R| ~ h away: every step squares that, a linear problem takes one."""
+        each = 1 if self.linear else max(1, math.ceil(math.log2(self._decades(h))))
+        steps = solves * each if self.steps is None else self.steps
+        return Work(forward_solves=solves, residuals=solves) + self._newton(steps)
 
-    def chord(self, h: float) -> Work:
-        steps = max(1, math.ceil(self._decades(h)) - 1)
-        return Work(forward_solves=1, newton_iterations=steps, residuals=steps + 1, solves=steps)
+    def chord(self, solves: int, h: float) -> Work:
+        """The same on given factors: every step multiplies |R| by about h."""
+        each = max(1, math.ceil(self._decades(h)) - 1)
+        steps = solves * each if self.steps is None else self.steps
+        return Work(forward_solves=solves, newton_iterations=steps, residuals=solves + steps, solves=steps)
 
     def _decades(self, h: float) -> float:
         """log rtol / log h, how often the perturbation must multiply itself to vanish."""
@@ -131,6 +137,4 @@ class ForwardWork:
 
     @staticmethod
     def _newton(k: int) -> Work:
-        if k == 0:
-            return Work(forward_solves=1)
-        return Work(1, newton_iterations=k, residuals=k + 1, assemblies=k, factorizations=k, solves=k)
+        return Work(newton_iterations=k, residuals=k, assemblies=k, factorizations=k, solves=k)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
+from problems.errors import InputError
 from problems.problem import OFFERED_AS, Array, Offers, Problem
 from routes.model import Model
 from routes.newton import ForwardWork
@@ -34,9 +36,10 @@ class Result(NamedTuple):
 
 Gradient = Callable[[Array], Result]
 Options = dict[str, Any]
+Affordable = Callable[[Options], bool]
 
 
-def no_objection(problem: Problem, **options: Any) -> str | None:
+def nothing_missing(problem: Problem, **options: Any) -> str | None:
     return None
 
 
@@ -44,12 +47,8 @@ def all_well(**options: Any) -> None:
     return None
 
 
-def as_given(model: Model, p: Array, **options: Any) -> Options:
+def as_given(model: Model, p: Array, affordable: Affordable = lambda options: True, **options: Any) -> Options:
     return options
-
-
-def no_tape(problem: Problem, **options: Any) -> int:
-    return 0
 
 
 @dataclass(frozen=True)
@@ -62,10 +61,11 @@ class Route:
               its keyword-only parameters are the route's options
     cost      (n_p, forward, **options) -> Work: the declared bill, n_p parameters, ForwardWork of one solve
     check     (**options) raises InputError for values that no problem could take
-    objects   (problem, **options) -> a sentence saying what else is missing, or None
-    expect    (model, p, **options) -> options, data-dependent defaults filled in by a cheap estimate
-    resolve   (model, p, **options) -> options, the same by measurement
-    tape      (problem, **options) -> bytes the AD tape is predicted to need
+    missing   (problem, **options) -> a sentence saying what else `problem` lacks, or None
+    resolve   (model, p, affordable, **options) -> options, data-dependent defaults filled in by measurement, which
+              ends early where `affordable(options)` says that they have become too dear to go on
+    expect    (model, p, **options) -> options, the same by a cheap estimate
+    tape      (problem, **options) -> bytes the AD tape is predicted to need; None where there is none
     """
 
     name: str
@@ -74,25 +74,37 @@ class Route:
     cost: Callable[..., Work]
     staged: bool = False
     check: Callable[..., None] = all_well
-    objects: Callable[..., str | None] = no_objection
-    expect: Callable[..., Options] = as_given
+    missing: Callable[..., str | None] = nothing_missing
     resolve: Callable[..., Options] = as_given
-    tape: Callable[..., int] = no_tape
+    expect: Callable[..., Options] = as_given
+    tape: Callable[..., int] | None = None
 
     @property
     def summary(self) -> str:
         """The equation it implements."""
         return " ".join((self.function.__doc__ or "").strip().split("\n\n")[0].split())
 
+    @cached_property
+    def defaults(self) -> Options:
+        """Its options with their defaults."""
+        parameters = inspect.signature(self.function).parameters.values()
+        return {q.name: q.default for q in parameters if q.kind is q.KEYWORD_ONLY}
+
     def objection(self, problem: Problem, **options: Any) -> str | None:
         """Why this route cannot run on `problem`, in a sentence; None if it can."""
         missing = [o for o in OFFERED_AS if o in self.needs and o not in problem.offers]
         if missing:
             return f"{self.name} needs {OFFERED_AS[missing[-1]]}, which {problem.name} does not offer"
-        return self.objects(problem, **options)
+        return self.missing(problem, **self.defaults | options)
 
     def prepare(self, model: Model, p: Array, **options: Any) -> Gradient:
-        """Everything done once for points near p (compilation, say); `options` as resolved."""
+        """Everything done once for points near p (compilation, say). Raises InputError for unknown options."""
+        unknown = options.keys() - self.defaults.keys()
+        if unknown:
+            raise InputError(f"{self.name}: no option '{min(unknown)}' - choose from {', '.join(self.defaults)}")
+        options = self.defaults | options
+        self.check(**options)
+        options = self.resolve(model, p, **options)
         gradient = self.function(model, p, **options) if self.staged else partial(self.function, model, **options)
         return lambda q: Result(*gradient(q))
 
@@ -102,4 +114,4 @@ def route(name: str, *, needs: Offers, cost: Callable[..., Work], **more: Any) -
     return lambda function: Route(name, needs, function, cost, **more)
 
 
-__all__ = ["ForwardWork", "Gradient", "Offers", "Options", "Result", "Route", "Work", "route"]
+__all__ = ["Affordable", "ForwardWork", "Gradient", "Offers", "Options", "Result", "Route", "Work", "route"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+import operator
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True)
@@ -29,13 +30,13 @@ class Work:
     transposed_solves: int = 0
 
     def __add__(self, other: Work) -> Work:
-        return Work(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return Work(*map(operator.add, vars(self).values(), vars(other).values()))
 
     def __sub__(self, other: Work) -> Work:
-        return Work(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return Work(*map(operator.sub, vars(self).values(), vars(other).values()))
 
     def __rmul__(self, times: int) -> Work:
-        return Work(*(times * a for a in astuple(self)))
+        return Work(*(times * a for a in vars(self).values()))
 
 
 KINDS = tuple(f.name for f in fields(Work))

@@ -12,7 +12,7 @@ from routes.route import ForwardWork, Offers, Result, Work, route
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return forward.cold() + forward.factors_at_solution() + Work(solves=n_p)
+    return forward.cold + forward.factors_at_solution() + Work(solves=n_p)
 
 
 @route("tangent", needs=Offers.LINEARIZE, cost=cost)

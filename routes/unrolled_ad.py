@@ -7,20 +7,19 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.errors import InputError
+from problems.errors import InputError, Overflow
 from problems.problem import Array, Problem
 from routes.model import Model
-from routes.route import ForwardWork, Gradient, Offers, Options, Result, Work, route
+from routes.route import Affordable, ForwardWork, Gradient, Offers, Options, Result, Work, route
 
 Inner = Annotated[Literal["cg", "richardson", "jacobi"], "the iteration on the tape"]
 Iterations = Annotated[int | None, "k [what the forward tolerance needs at p]"]
 KEPT = {"cg": (3, 73), "richardson": (2, 0), "jacobi": (2, 0)}  # per iteration: (n_u,) arrays, bytes of scalars
-AT_MOST = 10**7  # iterations while counting how many the tolerance needs
 NEVER = 10**15  # where an estimate of k ends: no machine iterates longer
 
 
 def cost(n_p: int, forward: ForwardWork, *, inner: str, iterations: int) -> Work:
-    return Work(forward_solves=1, residuals=1, matvecs=2 * iterations)
+    return Work(forward_solves=1, residuals=2, matvecs=2 * iterations)
 
 
 def check(*, inner: str, iterations: int | None) -> None:
@@ -28,7 +27,7 @@ def check(*, inner: str, iterations: int | None) -> None:
         raise InputError(f"unrolled-ad: iterations={iterations} - choose at least 1")
 
 
-def objects(problem: Problem, *, inner: str, iterations: int | None) -> str | None:
+def missing(problem: Problem, *, inner: str, iterations: int | None) -> str | None:
     if not problem.linear:
         return f"unrolled-ad[inner={inner}] iterates on linear problems, {problem.name} is nonlinear"
     if inner == "cg" and problem.structure != "spd":
@@ -49,13 +48,18 @@ def expect(model: Model, p: Array, *, inner: str, iterations: int | None) -> Opt
     return {"inner": inner, "iterations": iterations}
 
 
-def resolve(model: Model, p: Array, *, inner: str, iterations: int | None) -> Options:
-    """k as counted by iterating until the forward tolerance is met."""
+def resolve(
+    model: Model, p: Array, affordable: Affordable = lambda options: True, *, inner: str, iterations: int | None
+) -> Options:
+    """k as counted by iterating until the forward tolerance is met, or until that is no longer affordable."""
     if iterations is None:
         from routes.iterations import iteration
 
-        iterate = iteration(inner, model.traced, model.problem.n_state)
-        iterations = iterate.iterations_to(p, model.solver.rtol, AT_MOST)
+        iterate, at_most = iteration(inner, model.traced, model.problem.n_state), 256
+        iterations = iterate.iterations_to(p, model.solver.rtol, at_most)
+        while iterations == at_most and affordable({"inner": inner, "iterations": iterations}):
+            at_most *= 4
+            iterations = iterate.iterations_to(p, model.solver.rtol, at_most)
     return {"inner": inner, "iterations": iterations}
 
 
@@ -70,7 +74,7 @@ def tape(problem: Problem, *, inner: str, iterations: int) -> int:
     cost=cost,
     staged=True,
     check=check,
-    objects=objects,
+    missing=missing,
     expect=expect,
     resolve=resolve,
     tape=tape,
@@ -81,7 +85,7 @@ def unrolled_ad(model: Model, p: Array, *, inner: Inner = "cg", iterations: Iter
     from routes.differentiable import held_bytes
     from routes.iterations import count_products, iteration
 
-    assert iterations is not None, "resolved before"
+    assert iterations is not None  # Route.prepare resolves it
     iterate = iteration(inner, model.traced, model.problem.n_state)
 
     def objective(p: Any) -> tuple[Any, Any]:
@@ -98,6 +102,12 @@ def unrolled_ad(model: Model, p: Array, *, inner: Inner = "cg", iterations: Iter
         model.tally.count("forward_solves")
         model.tally.count("matvecs", products)
         residual = model.relative_residual(np.asarray(u), p)
-        return Result(float(J), np.asarray(sweep_back(pullback)), np.asarray(u), residual, tape=held_bytes(pullback))
+        dJ_dp = np.asarray(sweep_back(pullback))
+        if np.isfinite(J) and not np.isfinite(dJ_dp).all():
+            raise Overflow(
+                f"unrolled-ad: J = {J:g}, but the backward sweep of {iterations} {inner} iterations overflowed: it"
+                " amplifies rounding where R_u is ill-conditioned - iterate less, or take implicit-ad or adjoint"
+            )
+        return Result(float(J), dJ_dp, np.asarray(u), residual, tape=held_bytes(pullback))
 
     return gradient

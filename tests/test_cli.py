@@ -111,6 +111,31 @@ def test_the_budget_is_the_users(cli) -> None:
     assert run(cli, "--json", "--budget", "inf").rows[0]["status"] == "ok"
 
 
+def test_iterations_that_turn_out_too_dear_are_not_taped(cli, tmp_path: Path) -> None:
+    """The estimate of k ends at n_u, rounding does not: the bill is asked for again once k is known."""
+    p = 2.0 * np.random.default_rng(0).standard_normal(1000)
+    np.savetxt(tmp_path / "p.csv", p, header="log_E", comments="")
+    problem = "bar[n=1000,sensors=1000]"
+    row = run(cli, "--json", "--at", "p.csv", "--budget", "0.05", problem=problem, route="unrolled-ad").rows[0]
+    assert row["status"] == "skipped"
+    assert row["predicted_s"] > 0.05
+    assert row["predicted_work"]["matvecs"] > 2 * 1000
+    assert row["route_options"]["iterations"] == row["predicted_work"]["matvecs"] // 2
+
+
+def test_a_tape_beyond_memory_is_not_tried(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.bill.available_bytes", lambda: 10_000)
+    row = run(cli, "--json", route="unrolled-ad[iterations=100]").rows[0]
+    assert "of memory at hand" in row["reason"]
+    assert run(cli, "--json", "--budget", "inf", route="unrolled-ad[iterations=100]").rows[0]["status"] == "ok"
+
+
+def test_notes_and_reasons_name_their_problem(cli) -> None:
+    out = run(cli, "--budget", "1e-9", problem="bar[n=8|16]").out
+    assert "note: bar[n=16]: 11 of 16" in out
+    assert "skipped: bar[n=16]: adjoint: predicted" in out
+
+
 def test_an_overflowing_tape_is_a_failed_row_not_a_nan(cli, tmp_path: Path) -> None:
     """On rough moduli the backward sweep of CG amplifies without bound: the row says so, the next case runs."""
     p = np.random.default_rng(0).standard_normal(1000)
@@ -119,7 +144,7 @@ def test_an_overflowing_tape_is_a_failed_row_not_a_nan(cli, tmp_path: Path) -> N
               "--at", "p.csv", *QUICK)  # fmt: skip
     assert ran.code == 1
     assert ran.rows[0]["status"] == "failed"
-    assert "not finite" in ran.rows[0]["reason"]
+    assert "backward sweep" in ran.rows[0]["reason"]
     assert ran.rows[0]["gradient"] is None
     assert ran.rows[1]["status"] == "ok"
 
@@ -195,10 +220,22 @@ def test_wrong_points_are_named(cli, tmp_path: Path, text: str, says: str) -> No
     assert says in ran.err
 
 
-def test_click_finds_wrong_flags_itself(cli) -> None:
-    assert cli("run", "--problem", "bar").code == 2
-    assert cli("rnu").code == 2
-    assert cli("run", "--problem", "bar", "--route", "adjoint", "--budget", "x").code == 2
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ("run --problem bar", "--route"),
+        ("rnu", "No such command 'rnu'"),
+        ("run --problem bar --route adjoint --budget x", "'x' is not a valid float"),
+        ("export --format xls", "'xls'"),
+        ("list everything", "'everything'"),
+        ("run --problem bar --route adjoint --bugdet 3", "--bugdet"),
+    ],
+)
+def test_wrong_flags_are_one_line_too(cli, arguments: str, says: str) -> None:
+    ran = cli(*arguments.split())
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert says in ran.err
+    assert "--help" in ran.err
 
 
 def test_debug_shows_the_traceback(tmp_path: Path) -> None:
@@ -206,6 +243,10 @@ def test_debug_shows_the_traceback(tmp_path: Path) -> None:
     debug = shell("routes run --problem barr --route adjoint --debug", tmp_path)
     assert (plain.returncode, "Traceback" in plain.stderr) == (2, False)
     assert "Traceback" in debug.stderr
+    (tmp_path / "p.csv").write_text("E\n" + "1e-9\n" * 8)
+    case = "routes run --no-store --problem 'bar[parametrization=raw]' --route fd-central --at p.csv"
+    assert "Traceback" not in shell(case, tmp_path).stderr
+    assert "DomainError" in shell(f"{case} --debug", tmp_path).stderr
 
 
 @pytest.mark.parametrize("what", [[], ["problems"], ["routes"]])

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, shell
 
+FD = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "fd-extrapolated": 1e-10}
+
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -53,7 +55,7 @@ def test_plugins_run_beside_the_built_ins(site: Path, tmp_path: Path) -> None:
             continue
         assert row["status"] == "ok"
         assert row["work"] == row["predicted_work"]
-        assert row["gradient_error"] < {"fd-one-sided": 1e-5, "fd-central": 1e-8}.get(route, 1e-10)
+        assert row["gradient_error"] < FD.get(route, 1e-12)
     # no closed form there: another exact route judges, never the one being judged
     assert rows["duffing", "adjoint"]["reference"] == "complex-step"
     assert rows["duffing", "complex-step"]["reference"] == "tangent"

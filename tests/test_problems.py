@@ -145,7 +145,7 @@ def test_parameters_outside_their_domain_are_named() -> None:
 @pytest.mark.parametrize(
     ("text", "nodes"),
     [(5, [1, 2, 3, 4, 5]), ("3", [1, 2, 3]), ("0", []), ("2,4", [2, 4]), ("2+4", [2, 4]), ("6..8", [6, 7, 8]),
-     ("1,3..4", [1, 3, 4]), ([8, 1], [8, 1]), ("7..7", [7])],
+     ("1,3..4", [1, 3, 4]), ([8, 1], [8, 1]), ("7..7", [7]), (np.int64(2), [1, 2])],
 )  # fmt: skip
 def test_sensor_sets(text, nodes: list[int]) -> None:
     assert Bar(sensors=text).sensors.nodes.tolist() == nodes
@@ -164,6 +164,7 @@ def test_sensor_sets(text, nodes: list[int]) -> None:
         ({"sensors": [3, 3]}, "given 2 times"),
         ({"sensors": "1,x"}, "'x' is no node"),
         ({"sensors": ""}, "is no node"),
+        ({"sensors": [1.5]}, "whole"),
         ({"alpha": -1.0}, "alpha=-1"),
         ({"alpha": np.nan}, "alpha=nan"),
         ({"noise": -1.0}, "noise=-1"),
@@ -194,6 +195,7 @@ def test_bad_options_of_the_bar_are_one_line(options: dict, says: str) -> None:
         ("node,displacement\n1.5,0.5\n", "node 1.5"),
         ("node,displacement\n1,0.5\n1,0.6\n", "node 1 is given twice"),
         ("node,displacement\n1\n", "line 2 has 1 cells"),
+        ("node,displacement\n", "no rows"),
     ],
 )
 def test_bad_data_files_name_the_line(text: str, says: str, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from conftest import EXACT, OPTIONS, ROUTES, relative_error, somewhere, zoo
 from bench.accuracy import error
 from problems.bar import Bar
 from problems.errors import DomainError, InputError, NotConverged
-from problems.problem import Array, Problem, Reference
+from problems.problem import Array, Parameters, Problem, Reference
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.finite_difference import fd_central, fd_one_sided
@@ -42,16 +42,18 @@ def ids(value: object) -> str | None:
 
 
 def differentiate(route: Route, problem: Problem, p: Array, **options) -> tuple[Result, Work, Work]:
-    """The result, the work counted and the work declared."""
+    """The result, the work counted and the work declared: on a linear problem wholly before the run, on a nonlinear
+    one given the number of Newton steps it took."""
     model = Model(problem)
-    options = route.resolve(model, p, **options)
+    options = route.resolve(model, p, **route.defaults | options)
     gradient = route.prepare(model, p, **options)
     before = model.tally.work
     result = gradient(p)
     counted = model.tally.work - before
     state = Model(problem).solve(p)
-    declared = route.cost(len(p), ForwardWork(len(state.history) - 1, problem.linear, model.solver.rtol), **options)
-    return result, counted, declared
+    steps = None if problem.linear else counted.newton_iterations - state.work.newton_iterations
+    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, steps)
+    return result, counted, route.cost(len(p), forward, **options)
 
 
 def reference(problem: Problem, p: Array) -> Reference:
@@ -95,15 +97,54 @@ def test_declared_work_holds_for_every_size(route: Route, n: int) -> None:
         assert counted == declared
 
 
+@pytest.mark.parametrize("step", [None, 1e-2, 1e-4, 1e-8])
+@pytest.mark.parametrize("at", [0.0, 5.0])
+@pytest.mark.parametrize("start", ["warm", "chord"])
+@pytest.mark.parametrize("route", [fd_one_sided, fd_central], ids=ids)
+def test_declared_work_holds_for_every_step_given_the_steps_taken(route: Route, start: str, at: float, step) -> None:
+    """How many chord steps a perturbation needs depends on p: the formula takes their number as it takes Newton's k."""
+    bar = Bar(n=4)
+    model, p = Model(bar), np.full(4, at)
+    base = Model(bar).solve(p).work
+    gradient = route.prepare(model, p, step=step, start=start)
+    gradient(p)
+    steps = model.tally.work.newton_iterations - base.newton_iterations
+    assert route.cost(4, ForwardWork(base, steps=steps), step=step, start=start) == model.tally.work
+
+
+class BlackBox(Problem):
+    """J(p) = sum sin p_i, and nothing else is known."""
+
+    name = "black-box"
+    parameters = Parameters(start=np.array([0.3, -0.7, 0.0]), scale=np.ones(3))
+
+    def value(self, p: Array) -> float:
+        return float(np.sin(p).sum())
+
+
+def test_a_black_box_has_finite_differences_and_nothing_more() -> None:
+    problem = BlackBox()
+    p = problem.parameters.start
+    able = [route for route in ROUTES if route.objection(problem, **OPTIONS.get(route.name, [{}])[0]) is None]
+    assert able == [fd_one_sided, fd_central]
+    assert "start=warm needs R(u, p)" in str(fd_central.objection(problem, start="warm"))
+    for route, solves in ((fd_one_sided, 4), (fd_central, 6)):
+        model = Model(problem)
+        result = route.prepare(model, p)(p)
+        assert relative_error(result.gradient, np.cos(p)) < ACCURACY[route.name]
+        assert model.tally.work == route.cost(3, ForwardWork(Work(1)), **route.defaults) == Work(solves)
+
+
 def test_the_table_of_bills() -> None:
     """The formulas users choose by, literally."""
-    forward, n = ForwardWork(k=1), 10
+    one = Work(1, newton_iterations=1, residuals=2, assemblies=1, factorizations=1, solves=1)
+    forward, n = ForwardWork(one), 10
     assert fd_one_sided.cost(n, forward, step=None, start="cold").forward_solves == n + 1
     assert fd_central.cost(n, forward, step=None, start="cold").forward_solves == 2 * n
     assert fd_central.cost(n, forward, step=None, start="chord").factorizations == 1
     assert complex_step.cost(n, forward).forward_solves == n
-    assert tangent.cost(n, forward) == forward.cold() + Work(solves=n)
-    assert adjoint.cost(n, forward) == implicit_ad.cost(n, forward) == forward.cold() + Work(transposed_solves=1)
+    assert tangent.cost(n, forward) == one + Work(solves=n)
+    assert adjoint.cost(n, forward) == implicit_ad.cost(n, forward) == one + Work(transposed_solves=1)
     assert unrolled_ad.cost(n, forward, inner="cg", iterations=7).matvecs == 14
 
 

@@ -13,7 +13,7 @@ from bench import registry
 from bench.options import options_of
 from bench.views.palette import route_style
 from problems.errors import InputError
-from problems.problem import offer_names
+from problems.problem import Problem, offer_names
 from routes.route import Route
 
 
@@ -28,15 +28,15 @@ def listing(kind: registry.Kind) -> Group:
 def _block(kind: registry.Kind, entry: registry.Entry) -> Group:
     origin = "" if entry.origin == registry.BUILT_IN else f"  (from {entry.origin})"
     name = Text(entry.name + origin, style=f"bold {route_style(entry.name)}")
-    try:
-        target = entry.load()
-    except InputError as error:
-        return Group(name, Text(str(error), style="red"))
     options = Table(box=None, pad_edge=False, show_header=False)
     options.add_column(no_wrap=True)
     options.add_column()
-    for option in options_of(registry.factory_of(target)).values():
-        options.add_row(Text(option.text), Text(option.help))
+    try:
+        target = entry.load()
+        for option in options_of(registry.factory_of(target)).values():
+            options.add_row(Text(option.text), Text(option.help))
+    except InputError as error:
+        return Group(name, Text(str(error), style="red"))
     return Group(name, Text(_summary(target)), Text(f"{_contract(kind, target)}", style="dim"), options)
 
 
@@ -47,5 +47,8 @@ def _summary(target: Any) -> str:
 
 
 def _contract(kind: registry.Kind, target: Any) -> str:
-    flags = target.needs if isinstance(target, Route) else target.offers
-    return f"{'needs' if kind == 'route' else 'offers'}: {', '.join(offer_names(flags))}"
+    if isinstance(target, Route):
+        return f"needs: {', '.join(offer_names(target.needs))}"
+    if isinstance(target, type) and issubclass(target, Problem):
+        return f"offers: {', '.join(offer_names(target.offers))}"
+    return "offers: what it is built with"

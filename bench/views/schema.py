@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bench.rows import ENVIRONMENTS, SAMPLES, STORED, Column
+from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED, Column
 
 HEAD = """# Results
 
@@ -12,10 +12,6 @@ HEAD = """# Results
 `routes export --table TABLE --format csv|parquet|json` hands it to other programs. An absent value is NULL, never NaN.
 Columns that hold objects (options, gradient, threads, versions) are JSON text.
 """
-KEYS = (
-    Column("case_id", "INTEGER", "", "counts the cases of this store"),
-    Column("environment_id", "TEXT", "", "of the row in environments"),
-)
 
 
 def markdown() -> str:

@@ -99,18 +99,18 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
     against = f" against the {judges[0]}" if len(judges) == 1 else ""
     legend = f"error: |g - g_ref| / |g_ref|{against}; x fwd: time in forward solves\nwork: {LEGEND}"
     lines = {"": Text(legend, style="dim")}
+    problems = {id(row): named("problem", row) for row in rows}
+    several = len(set(problems.values())) > 1
     for row in rows:
         if row["status"] != "ok":
-            style = "dim" if row["status"] == "skipped" else "red"
-            reason = row["reason"]
-            head = "" if reason.startswith(row["route"]) else f"{row['route']}: "
-            line = f"{row['status']}: {head}{reason}"
-            lines.setdefault(line, Text(line, style=style))
+            where = f"{problems[id(row)]}: " if several else ""
+            route = "" if row["reason"].startswith(row["route"]) else f"{row['route']}: "
+            line = f"{row['status']}: {where}{route}{row['reason']}"
+            lines.setdefault(line, Text(line, style="dim" if row["status"] == "skipped" else "red"))
     for row in rows:
-        for note in (row["note"] or "").split("; "):
-            if note:
-                about = row["route"] if "apart" in note else row["problem"]
-                lines.setdefault(note, Text(f"note: {about}: {note}", style="italic"))
+        for note in filter(None, (row["note"] or "").split("; ")):
+            line = f"note: {problems[id(row)]}: {note}"
+            lines.setdefault(line, Text(line, style="italic"))
     return list(lines.values())
 
 

@@ -32,7 +32,7 @@ class Duffing(Problem):
         self.laplacian = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
         self.f = np.full(n, load)
         self.parameters = Parameters(
-            start=np.array([1.0, 1.0]), scale=np.ones(2), lower=0.0, label=lambda i: ("k", "c")[i]
+            start=np.ones(2), scale=np.ones(2), lower=0.0, unit=("N/m", "N/m^3"), label=lambda i: "kc"[i]
         )
         self.d = 0.8 * load * np.sin(np.pi * np.arange(1, n + 1) / (n + 1))
 
