@@ -31,7 +31,7 @@ class Judges:
     def judge(self, route: Route) -> Reference | None:
         """The problem's own reference, or another exact route's gradient where n_p is small, or None."""
         if not self._asked:
-            self._own, self._asked = self.model.problem.reference(self.p), True
+            self._own, self._asked = self._sound(self.model.problem.reference(self.p)), True
         if self._own is not None or len(self.p) > MANY:
             return self._own
         for name in JUDGES:
@@ -49,7 +49,13 @@ class Judges:
             gradient = route.prepare(self.model, self.p)(self.p).gradient
         except RoutesError:  # a judge that fails is no reason to fail the judged
             return None
-        return Reference(route.name, gradient, float(np.linalg.norm(gradient)))
+        return self._sound(Reference(route.name, gradient, norm2(gradient)))
+
+    def _sound(self, reference: Reference | None) -> Reference | None:
+        """A reference that is no finite vector (n_p,) judges nobody."""
+        if reference is None or reference.gradient.shape != self.p.shape or not np.isfinite(reference.gradient).all():
+            return None
+        return reference
 
 
 def error(gradient: Array, reference: Reference) -> tuple[float, str]:
@@ -58,9 +64,17 @@ def error(gradient: Array, reference: Reference) -> tuple[float, str]:
     Where g_ref is zero up to the rounding of the terms that make it, the error is relative to those terms, and
     the name says so.
     """
-    difference = float(np.linalg.norm(gradient - reference.gradient))
-    scale = float(np.linalg.norm(reference.gradient))
+    difference, scale = norm2(gradient - reference.gradient), norm2(reference.gradient)
     rounding = 8.0 * np.finfo(np.float64).eps * np.sqrt(len(gradient)) * reference.size
     if scale > rounding:
         return difference / scale, reference.name
-    return difference / (reference.size or 1.0), f"{reference.name} (zero: relative to its terms)"
+    relative = difference / reference.size if reference.size else (0.0 if difference == 0.0 else np.inf)
+    return relative, f"{reference.name} (zero: relative to its terms)"
+
+
+def norm2(v: Array) -> float:
+    """|v|_2, also of components whose squares leave float64's range."""
+    largest = float(np.abs(v).max(initial=0.0))
+    if largest == 0.0 or not np.isfinite(largest):
+        return largest
+    return largest * float(np.linalg.norm(v / largest))

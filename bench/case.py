@@ -8,7 +8,7 @@ from typing import Any
 
 from bench import options, registry, selector
 from problems.errors import InputError
-from problems.problem import Array, Problem
+from problems.problem import Array, Parameters, Problem
 from problems.tables import read_columns
 from routes.route import Route
 
@@ -22,7 +22,9 @@ class ProblemSpec:
     build: Any
 
     def __call__(self) -> Problem:
-        problem: Problem = self.build(**self.options)
+        problem = self.build(**self.options)
+        if not isinstance(problem, Problem) or not isinstance(problem.parameters, Parameters):
+            raise TypeError(f"its factory made a {type(problem).__name__}, not a Problem with Parameters")
         return problem
 
 
@@ -65,12 +67,12 @@ def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str,
 def point(problem: Problem, at: str) -> Array:
     """p (n_p,) for `start`, `true` or a CSV file of one column. Raises InputError, DomainError."""
     if at == "start":
-        return problem.parameters.start.copy()
+        return problem.parameters.check(problem.parameters.start.copy(), f"{problem.name}, start")
     if at == "true":
         truth = problem.truth()
         if truth is None:
             raise InputError(f"{problem.name}: the true parameters are not known - use --at start or --at FILE.csv")
-        return truth
+        return problem.parameters.check(truth, f"{problem.name}, true")
     columns = read_columns(at, None)
     if len(columns) != 1:
         raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")

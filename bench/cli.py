@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+import signal
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -23,20 +26,43 @@ class Routes(click.Group):
     """Turns errors into one line and an exit code; --debug lets the traceback through."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        mend_streams()
         try:
             return super().invoke(ctx)
         except (InputError, DomainError) as error:
             if debugging():
                 raise
-            click.echo(f"routes: {error}", err=True)
+            complain(str(error))
             ctx.exit(WRONG_USAGE)
         except click.UsageError as error:
             about = error.ctx.command_path if error.ctx else "routes"
-            click.echo(f"routes: {error.format_message()} - see {about} --help", err=True)
+            complain(f"{error.format_message()} - see {about} --help")
             ctx.exit(WRONG_USAGE)
         except KeyboardInterrupt:
-            click.echo("routes: interrupted - finished cases are printed, and kept unless --no-store", err=True)
+            complain("interrupted - finished cases are printed, and kept unless --no-store")
             ctx.exit(INTERRUPTED)
+        except BrokenPipeError:
+            raise  # click ends quietly: whoever read has read enough
+        except OSError as error:
+            if debugging():
+                raise
+            complain(f"{error.strerror or error} - check where the output goes")
+            ctx.exit(WRONG_USAGE)
+
+
+def complain(what: str) -> None:
+    """One line on stderr, whatever a name in it holds."""
+    click.echo(f"routes: {' '.join(what.split())}", err=True)
+
+
+def mend_streams() -> None:
+    """A closed stream swallows what is written; a character the terminal cannot show is escaped."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - for the life of the process
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 @click.group(cls=Routes, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -125,16 +151,23 @@ def run(
     if kept is not None:
         kept.check_writable()
     done: list[Outcome] = []
+    lost: list[str] = []
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
     try:
         for outcome in with_progress(outcomes, len(problem_specs) * len(route_specs)):
             done.append(outcome)
-            if kept is not None:
-                kept.append(outcome.row, outcome.samples)
+            try:
+                if kept is not None:
+                    kept.append(outcome.row, outcome.samples)
+            except InputError as error:  # a full disk, a lock: the row is printed all the same
+                lost.append(str(error))
             if as_json:
                 click.echo(json_line(outcome.row))
     finally:  # an interrupt leaves what was measured on the screen, too
         if not as_json:
             show([o.row for o in done], [(o.row, o.view) for o in done if o.view is not None])
+    if lost:
+        raise InputError(f"{len(lost)} of {len(done)} rows were not kept: {lost[0]}")
     if debugging():
         click.echo("".join(outcome.traceback or "" for outcome in done), err=True, nl=False)
     if any(outcome.row["status"] == "failed" for outcome in done):
@@ -148,12 +181,12 @@ def show(rows: list[Row], views: Iterable[tuple[Row, View]] = ()) -> None:
     if not rows:
         return
     out = tables.console()
-    out.print(tables.results(rows))
+    tables.show(out, tables.results(rows))
     for line in tables.remarks(rows):
-        out.print(line, soft_wrap=True)
+        out.print(line, soft_wrap=not out.is_terminal)
     for row, view in views:
         out.print()
-        out.print(tables.gradient(row, view))
+        tables.show(out, tables.gradient(row, view))
 
 
 def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:

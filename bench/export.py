@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from pathlib import Path
@@ -22,17 +23,25 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
     names, records = store.table(table)
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
+    if output is not None and output.resolve() == store.path.resolve():
+        raise InputError(f"export: {output} is the store itself - name another file with -o")
+    if format == "json":
+        rows = [dict(zip(names, record, strict=True)) for record in records]
+        content = (json.dumps(rows, allow_nan=False) + "\n").encode()
+    elif format == "parquet":
+        buffer = io.BytesIO()
+        frame(names, records).to_parquet(buffer, index=False)
+        content = buffer.getvalue()
+    else:
+        content = frame(names, records).to_csv(index=False).encode()
     try:
         with click.open_file(str(output or "-"), "wb") as file:
-            if format == "json":
-                rows = [dict(zip(names, record, strict=True)) for record in records]
-                file.write((json.dumps(rows, allow_nan=False) + "\n").encode())
-            elif format == "parquet":
-                frame(names, records).to_parquet(file, index=False)
-            else:
-                file.write(frame(names, records).to_csv(index=False).encode())
+            file.write(content)
+    except BrokenPipeError:
+        raise
     except OSError as error:
-        raise InputError(f"export: {output}: {error.strerror} - name a file you may write with -o") from error
+        where = output or "stdout"
+        raise InputError(f"export: {where}: {error.strerror} - name a file you may write with -o") from error
 
 
 def frame(names: list[str], records: list[tuple[Any, ...]]) -> Any:

@@ -100,6 +100,8 @@ def _converted(kind: Any, text: str) -> Any:
     if get_origin(kind) is Literal:
         choices = {str(choice): choice for choice in get_args(kind)}
         return choices[text] if text in choices else _refuse(text)
+    if kind in (int, float) and "_" in text:
+        return _refuse(text)  # Python would read 1_0 as 10
     if kind is int:
         return _whole_number(text)
     if kind is bool:
@@ -113,11 +115,10 @@ def _converted(kind: Any, text: str) -> Any:
 
 def _whole_number(text: str) -> int:
     """Also 1e6, which people write; not 1e300, which a float rounds."""
-    try:
-        return int(text)
-    except ValueError:
-        number = float(text)
-        return int(number) if abs(number) < 2**53 and number == int(number) else _refuse(text)
+    number = float(text)
+    if not abs(number) < 2**53 or number != int(number):
+        return int(_refuse(text))
+    return int(number)
 
 
 def _refuse(text: str) -> Any:

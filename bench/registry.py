@@ -36,7 +36,7 @@ class Entry:
         """The factory of a problem, or the Route. Raises InputError with the reason if that fails."""
         try:
             target = self.point.load()
-        except Exception as error:  # a plug-in may raise anything while it is imported
+        except (Exception, SystemExit) as error:  # a plug-in may raise anything while it is imported
             said = " ".join(str(error).split())
             raise InputError(
                 f"{self.kind} '{self.name}' of {self.origin} cannot be imported: {type(error).__name__}: {said}"
@@ -44,6 +44,8 @@ class Entry:
             ) from error
         if self.kind == "route" and not isinstance(target, Route):
             raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
+        if self.kind == "route" and target.name != self.name:
+            raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
         if self.kind == "problem" and not callable(target):
             raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
         return target
@@ -58,13 +60,18 @@ class Entry:
 
 
 @cache
-def entries(kind: Kind) -> dict[str, Entry]:
-    """All registered entries of a kind, built-ins first; of two with one name, the built-in or first one counts."""
+def registered(kind: Kind) -> list[Entry]:
+    """All entries of a kind, built-ins first."""
     found = [Entry(kind, point) for point in entry_points(group=f"gradient_routes.{kind}s")]
     order = {name: i for i, name in enumerate(ORDER)}
-    found.sort(key=lambda e: (e.origin != BUILT_IN, order.get(e.name, len(order)), e.name))
+    return sorted(found, key=lambda e: (e.origin != BUILT_IN, order.get(e.name, len(order)), e.name))
+
+
+@cache
+def entries(kind: Kind) -> dict[str, Entry]:
+    """The entries that count: of two with one name, the built-in or first one."""
     first: dict[str, Entry] = {}
-    for entry in found:
+    for entry in registered(kind):
         first.setdefault(entry.name, entry)
     return first
 

@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from routes.tally import KINDS
 
 Row = dict[str, Any]
@@ -102,12 +104,17 @@ def clean(value: Any) -> Any:
         return {key: clean(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [clean(item) for item in value]
+    if isinstance(value, np.generic):
+        return clean(value.item())
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode()
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def storable(value: Any) -> Any:
     """SQLite's integers end at 2^63; a predicted count may not."""
-    return float(value) if isinstance(value, int) and value >= 2**63 else clean(value)
+    value = clean(value)
+    return float(value) if isinstance(value, int) and value >= 2**63 else value
 
 
 def as_json(row: Row) -> str:

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import datetime
+import sys
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from bench.accuracy import Judges, error
+from bench.accuracy import Judges, error, norm2
 from bench.bill import Prices, prices, unaffordable
 from bench.case import ProblemSpec, RouteSpec, point
 from bench.memory import peak_of
 from bench.rows import Row, empty_row
 from bench.timing import Samples, rounds, seconds_of
-from problems.errors import InputError, RoutesError
+from problems.errors import RoutesError
 from problems.problem import Array, Offers, ParameterView, Reference
 from routes.model import Model
 from routes.newton import Solver, State
 from routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
+FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
 LONG = 1.0  # [s] calls that take longer are not repeated: one call is timed and its memory read
 
 
@@ -68,8 +71,36 @@ def run(problems: list[ProblemSpec], routes: list[RouteSpec], settings: Settings
     measured. Then one at a time is held.
     """
     for spec in problems:
-        Workbench(spec, settings)
-    return (outcome for spec in problems for outcome in Workbench(spec, settings).outcomes(routes))
+        workbench(spec, settings)
+    return (outcome for spec in problems for outcome in outcomes(spec, routes, settings))
+
+
+def outcomes(spec: ProblemSpec, routes: list[RouteSpec], settings: Settings) -> Iterator[Outcome]:
+    """All routes on one problem; a problem that cannot be built fails on every route."""
+    bench = workbench(spec, settings)
+    for route in routes:
+        yield bench.outcome(route) if isinstance(bench, Workbench) else replace(bench, row=bench.row | _names(route))
+
+
+def workbench(spec: ProblemSpec, settings: Settings) -> Workbench | Outcome:
+    """The problem set up, or the failed outcome of a factory that raised what it should not."""
+    try:
+        return Workbench(spec, settings)
+    except RoutesError:
+        raise
+    except FOREIGN as failure:
+        row = empty_row() | {
+            "problem": spec.name,
+            "problem_options": spec.options,
+            "at": settings.at,
+            "status": "failed",
+            "reason": f"problem '{spec.name}' cannot be built: {_one_line(failure)} - see --debug",
+        }
+        return Outcome(row, traceback=traceback.format_exc())
+
+
+def _names(spec: RouteSpec) -> Row:
+    return {"route": spec.route.name, "route_options": spec.options}
 
 
 class Workbench:
@@ -77,40 +108,33 @@ class Workbench:
 
     def __init__(self, spec: ProblemSpec, settings: Settings) -> None:
         self.spec, self.settings = spec, settings
-        try:
-            self.build_s, self.problem = seconds_of(spec)
-            self.p = point(self.problem, settings.at)
-        except RoutesError:
-            raise
-        except Exception as error:  # a plug-in may raise anything
-            raise InputError(f"problem '{spec.name}' cannot be built: {_one_line(error)} - see --debug") from error
+        self.build_s, self.problem = seconds_of(spec)
+        self.p = point(self.problem, settings.at)
+        self.p.flags.writeable = False  # shared by all routes
         self.judges = Judges(self.model(), self.p, self._unaffordable_judge)
         self._priced: tuple[Prices, State | None] | Exception | None = None
 
     def model(self) -> Model:
         return Model(self.problem, self.settings.solver)
 
-    def outcomes(self, routes: list[RouteSpec]) -> Iterator[Outcome]:
-        return (self.outcome(route) for route in routes)
-
     def outcome(self, spec: RouteSpec) -> Outcome:
         """Run one route on the problem. What goes wrong becomes a failed row, and the next case runs."""
         row = empty_row() | {
             "problem": self.spec.name,
             "problem_options": self.spec.options,
-            "route": spec.route.name,
-            "route_options": spec.options,
+            **_names(spec),
             "at": self.settings.at,
             "n_param": len(self.p),
             "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
         }
         try:
             row |= {"n_state": self.problem.n_state, "note": "; ".join(self.problem.notes) or None}
-            with np.errstate(all="ignore"):  # every number that is kept is checked to be finite
+            # every number that is kept is checked to be finite; stdout belongs to the results
+            with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
                 return self._run(spec, row)
         except RoutesError as failure:
             return Outcome(row | {"status": "failed", "reason": str(failure)}, traceback=traceback.format_exc())
-        except Exception as failure:  # a plug-in may raise anything
+        except FOREIGN as failure:
             reason = f"{spec.route.name}: {_one_line(failure)} - see --debug"
             return Outcome(row | {"status": "failed", "reason": reason}, traceback=traceback.format_exc())
 
@@ -152,8 +176,10 @@ class Workbench:
         before = model.tally.work
         row["first_s"], result = seconds_of(lambda: gradient(self.p))
         work = model.tally.work - before
-        declared = replace(self.prices.declared, steps=work.newton_iterations - self._base_iterations)
-        row |= {"work": asdict(work), "predicted_work": asdict(route.cost(len(self.p), declared, **options))}
+        declared = route.cost(len(self.p), replace(self.prices.declared, steps=work.newton_iterations), **options)
+        row |= {"work": asdict(work), "predicted_work": asdict(declared)}
+        if work != declared:
+            _note(row, f"{route.name}: counted work differs from the declared")
         self._judge(route, result, row)
         forward = self._forward()
         if row["first_s"] < LONG:
@@ -176,6 +202,8 @@ class Workbench:
 
     def _judge(self, route: Route, result: Result, row: Row) -> None:
         """Fill in J, the gradient and its error; raise Failure for numbers that are none."""
+        if np.iscomplexobj(result.gradient):
+            raise Failure(f"{route.name}: gradient of complex numbers - return the real dJ/dp")
         g = np.asarray(result.gradient, dtype=np.float64)
         if g.shape != self.p.shape:
             raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(self.p)} parameters - mend the route")
@@ -188,15 +216,15 @@ class Workbench:
         J = result.J
         if J is None:
             J = self.objective()
-            row["note"] = "; ".join(filter(None, [row["note"], f"{route.name}: objective from 1 forward solve apart"]))
+            _note(row, f"{route.name}: objective from 1 forward solve apart")
         if not np.isfinite(J):
             raise Failure(f"{route.name}: J = {J} - check p and the data")
         row |= {
             "objective": float(J),
             "gradient": g.tolist() if g.size <= KEEP_GRADIENT or self.settings.gradient else None,
-            "gradient_norm": float(np.linalg.norm(g)),
-            "residual": result.residual,
-            "tape_bytes": result.tape,
+            "gradient_norm": norm2(g),
+            "residual": None if result.residual is None else float(result.residual),
+            "tape_bytes": None if result.tape is None else int(result.tape),
         }
         reference = self.judges.judge(route)
         if reference is not None:
@@ -216,10 +244,6 @@ class Workbench:
     @property
     def prices(self) -> Prices:
         return self._price()[0]
-
-    @property
-    def _base_iterations(self) -> int:
-        return self.prices.declared.cold.newton_iterations
 
     def objective(self) -> float:
         """J(p) of the forward solve that set the prices."""
@@ -243,6 +267,10 @@ class Workbench:
         return View(labels, np.asarray(result.gradient), self.judges.judge(route), columns)
 
 
-def _one_line(error: Exception) -> str:
+def _note(row: Row, note: str) -> None:
+    row["note"] = f"{row['note']}; {note}" if row["note"] else note
+
+
+def _one_line(error: BaseException) -> str:
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__

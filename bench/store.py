@@ -49,14 +49,15 @@ class Store:
 
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
-        if not self.path.is_file():
-            raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
-        with self._errors(), closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=rw", uri=True)) as db:
-            if not db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-                raise InputError(f"store {self.path}: is empty - run `routes run` first, or name one with --store")
-            self._check_kind(db)
-            cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
-            return [d[0] for d in cursor.description], cursor.fetchall()
+        with self._errors():
+            if not self.path.is_file():
+                raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
+            with closing(sqlite3.connect(self._uri("rw"), uri=True, timeout=PATIENCE)) as db:
+                if not self._has_tables(db):
+                    raise InputError(f"store {self.path}: is empty - run `routes run` first, or name another")
+                self._check_kind(db)
+                cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
+                return [d[0] for d in cursor.description], cursor.fetchall()
 
     def rows(self) -> list[Row]:
         """The cases as rows again."""
@@ -65,20 +66,29 @@ class Store:
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
-        if self.path.is_dir():
-            raise InputError(f"store {self.path}: is a directory - name a file in it, like {self.path}/routes.sqlite")
         with self._errors():
+            if self.path.is_dir():
+                raise InputError(f"store {self.path}: is a directory - name a file in it: {self.path}/routes.sqlite")
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with closing(sqlite3.connect(self.path, timeout=PATIENCE, isolation_level=None)) as db:
+            with closing(sqlite3.connect(self._uri("rwc"), uri=True, timeout=PATIENCE, isolation_level=None)) as db:
                 db.execute("BEGIN IMMEDIATE")
-                self._create_if_new(db)
+                if self._has_tables(db):
+                    self._check_kind(db)
+                else:
+                    self._create(db)
                 yield db
                 db.execute("COMMIT")  # an exception before this leaves the file as it was
 
-    def _create_if_new(self, db: sqlite3.Connection) -> None:
-        if db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+    def _uri(self, mode: str) -> str:
+        return f"{self.path.absolute().as_uri()}?mode={mode}"
+
+    @staticmethod
+    def _has_tables(db: sqlite3.Connection) -> bool:
+        return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+
+    def _create(self, db: sqlite3.Connection) -> None:
+        if db.execute("PRAGMA application_id").fetchone()[0] != 0:
             self._check_kind(db)
-            return
         cases = ", ".join(f"{c.name} {c.type}" for c in STORED)
         samples = ", ".join(f"{c.name} {c.type}" for c in SAMPLES)
         environments = ", ".join(f"{c.name} {c.type}" for c in ENVIRONMENTS)
@@ -92,8 +102,8 @@ class Store:
         if db.execute("PRAGMA application_id").fetchone()[0] != APPLICATION:
             raise InputError(f"store {self.path}: is a database of another program - name another file with --store")
         schema = db.execute("PRAGMA user_version").fetchone()[0]
-        if schema > SCHEMA:
-            raise InputError(f"store {self.path}: has schema {schema}, this version reads up to {SCHEMA} - update it")
+        if schema != SCHEMA:
+            raise InputError(f"store {self.path}: has schema {schema}, this version needs {SCHEMA} - name another file")
 
     @staticmethod
     def _environment_id(db: sqlite3.Connection) -> str:
@@ -111,4 +121,5 @@ class Store:
             yield
         except (sqlite3.Error, OSError) as error:
             what = error.strerror if isinstance(error, OSError) else str(error)
-            raise InputError(f"store {self.path}: {what} - name a file you may write with --store") from error
+            todo = "try again later" if "locked" in str(what) else "name a file you may write with --store"
+            raise InputError(f"store {self.path}: {what} - {todo}") from error

@@ -17,7 +17,9 @@ from problems.regularization import tikhonov, tikhonov_gradient
 from problems.sensors import Nodes, Sensors, measured, parse_nodes
 
 L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
-THETA_MAX = 300.0  # E = exp(theta) and the squares the gradient needs stay in float64's range
+THETA_MAX = 170.0  # E = exp(theta) < 1e74: the squares and cubes of E in J and dJ/dE stay in float64's range
+
+N_MAX = 10**7  # a gradient then takes 1 GB
 
 
 def true_modulus(x: Array) -> Array:
@@ -53,8 +55,8 @@ class Bar(Problem):
         seed: Annotated[int, "of that noise"] = 0,
         alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
     ) -> None:
-        if n < 1:
-            raise InputError(f"bar: n={n} elements - choose n >= 1")
+        if not 1 <= n <= N_MAX:
+            raise InputError(f"bar: n={n} elements - choose n >= 1 and <= {N_MAX}")
         if not (alpha >= 0 and math.isfinite(alpha)):
             raise InputError(f"bar: alpha={alpha:g} - a weight is finite and >= 0")
         if not (noise >= 0 and math.isfinite(noise)):
@@ -81,7 +83,7 @@ class Bar(Problem):
             start=np.zeros(n) if self.log else np.ones(n),
             scale=np.ones(n),
             lower=-THETA_MAX if self.log else 0.0,
-            upper=THETA_MAX if self.log else np.inf,
+            upper=THETA_MAX if self.log else math.exp(THETA_MAX),
             unit="log Pa" if self.log else "Pa",
             label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
         )

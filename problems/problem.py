@@ -77,6 +77,15 @@ class Parameters:
     unit: str | tuple[str, ...] = "1"
     label: Callable[[int], str] = default_label
 
+    def __post_init__(self) -> None:
+        for name in ("start", "scale"):  # integers would truncate every step
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
+        if self.start.ndim != 1 or self.scale.shape != self.start.shape or not (self.scale > 0).all():
+            raise InputError(
+                f"parameters: start {self.start.shape} and scale {self.scale.shape} - give two vectors of one length,"
+                " scale > 0"
+            )
+
     def __len__(self) -> int:
         return len(self.start)
 

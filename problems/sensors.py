@@ -62,12 +62,12 @@ def parse_nodes(nodes: Nodes, n: int, who: str) -> Array:
 
 
 def _nodes_from_text(text: str, n: int, who: str) -> int | list[int]:
-    if text.strip().isdecimal():
+    if text.strip().isdecimal() and len(text) < 19:
         return int(text)
     nodes: list[int] = []
     for item in text.replace("+", ",").split(","):
         first, dots, last = (part.strip() for part in item.partition(".."))
-        if not first.isdecimal() or (dots and not last.isdecimal()):
+        if not all(part.isdecimal() and len(part) < 19 for part in ([first, last] if dots else [first])):
             raise InputError(
                 f"{who}: sensors={text}: {item.strip()!r} is no node - write 5 (the first 5), 1,3,5 or 2..6"
             )

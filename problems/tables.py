@@ -29,6 +29,9 @@ def read_columns(path: str | Path, names: tuple[str, ...] | None) -> dict[str, A
     if all(_is_number(cell) for cell in header):
         raise InputError(f"{path}: line 1 holds numbers - the first line names the columns")
     wanted = tuple(header) if names is None else names
+    twice = [name for name in header if header.count(name) > 1]
+    if twice:
+        raise InputError(f"{path}: column {twice[0]} is given {header.count(twice[0])} times - keep one")
     missing = [name for name in wanted if name not in header]
     if missing:
         raise InputError(f"{path}: no column {', '.join(missing)}; it has {', '.join(header)} - rename or add it")
@@ -52,7 +55,7 @@ def _is_number(cell: str) -> bool:
 
 def _number(cell: str, where: str) -> float:
     try:
-        value = float(cell)
+        value = float(cell.replace("_", "?"))  # Python would read 1_0 as 10
     except ValueError:
         raise InputError(f"{where}: {cell.strip()!r} is not a number - write one, like 0.5") from None
     if not math.isfinite(value):

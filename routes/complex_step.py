@@ -14,14 +14,15 @@ RELATIVE_STEP = 1e-30  # its square is far below eps, itself far above the small
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return n_p * forward.at_complex_p()
+    return forward.solves(n_p, polish=1)
 
 
 @route("complex-step", needs=Offers.SOLVE | Offers.COMPLEX, cost=cost)
 def complex_step(model: Model, p: Array) -> Result:
-    """dJ/dp_i = Im J(p + i h e_i) / h,  h = 1e-30 scale_i."""
+    """dJ/dp_i = Im J(p + i h e_i) / h,  h = 1e-30 scale_i (1e-30 |p_i| where that is less)."""
     gradient = np.empty_like(p)
-    for i, h in enumerate(RELATIVE_STEP * model.parameters.scale):
+    scale = model.parameters.scale
+    for i, h in enumerate(RELATIVE_STEP * np.where(p == 0.0, scale, np.minimum(np.abs(p), scale))):
         q = p.astype(np.complex128)
         q[i] += 1j * h
         J = model.solve(q).J

@@ -33,18 +33,15 @@ def missing(problem: Problem, *, start: str, **options: Any) -> str | None:
 
 
 def cost_one_sided(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
-    return forward.cold + perturbed(n_p, forward, start, step or ONE_SIDED)
+    return forward.solves(n_p + 1) if start == "cold" else near(forward, start)(n_p, step or ONE_SIDED)
 
 
 def cost_central(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
-    base = Work() if start == "cold" else forward.cold
-    return base + perturbed(2 * n_p, forward, start, step or CENTRAL)
+    return forward.solves(2 * n_p) if start == "cold" else near(forward, start)(2 * n_p, step or CENTRAL)
 
 
-def perturbed(solves: int, forward: ForwardWork, start: str, h: float) -> Work:
-    if start == "cold":
-        return solves * forward.cold
-    return forward.warm(solves, h) if start == "warm" else forward.chord(solves, h)
+def near(forward: ForwardWork, start: str) -> Callable[[int, float], Work]:
+    return forward.warm if start == "warm" else forward.chord
 
 
 @route("fd-one-sided", needs=Offers.VALUE, cost=cost_one_sided, check=check, missing=missing)

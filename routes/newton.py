@@ -103,7 +103,7 @@ class ForwardWork:
     cold     counted for one solve at the p in question; a black box counts just that one
     linear   R is affine in u
     rtol     of the solver
-    steps    Newton and chord steps of all perturbed solves together, once they are known; None estimates them
+    steps    Newton and chord steps of all solves together, once they are known; None estimates them
     """
 
     cold: Work
@@ -111,25 +111,29 @@ class ForwardWork:
     rtol: float = Solver.rtol
     steps: int | None = None
 
-    def at_complex_p(self) -> Work:
-        """A cold solve at a complex p: see Model.solve."""
-        return self.cold if self.linear or not self.cold.newton_iterations else self.cold + self._newton(1)
+    def solves(self, times: int, polish: int = 0) -> Work:
+        """`times` cold solves near p; at complex p, `polish` = 1: see Model.solve."""
+        extra = 0 if self.linear else times * polish
+        if self.steps is not None and not self.linear:
+            extra = self.steps - times * self.cold.newton_iterations
+        return times * self.cold + self._newton(extra)
 
     def factors_at_solution(self) -> Work:
         """See Model.factors_at."""
         return Work() if self.linear else Work(assemblies=1, factorizations=1)
 
-    def warm(self, solves: int, h: float) -> Work:
-        """`solves` Newton solves from a state |R| ~ h away: every step squares that, a linear problem takes one."""
+    def warm(self, times: int, h: float) -> Work:
+        """A cold solve and `times` from its state, |R| ~ h away: a step squares that, a linear problem takes one."""
         each = 1 if self.linear else max(1, math.ceil(math.log2(self._decades(h))))
-        steps = solves * each if self.steps is None else self.steps
-        return Work(forward_solves=solves, residuals=solves) + self._newton(steps)
+        return self.cold + Work(forward_solves=times, residuals=times) + self._newton(self._perturbed(times * each))
 
-    def chord(self, solves: int, h: float) -> Work:
-        """The same on given factors: every step multiplies |R| by about h."""
-        each = max(1, math.ceil(self._decades(h)) - 1)
-        steps = solves * each if self.steps is None else self.steps
-        return Work(forward_solves=solves, newton_iterations=steps, residuals=solves + steps, solves=steps)
+    def chord(self, times: int, h: float) -> Work:
+        """The same on the factors of the cold one: every step multiplies |R| by about h."""
+        steps = self._perturbed(times * max(1, math.ceil(self._decades(h)) - 1))
+        return self.cold + Work(times, newton_iterations=steps, residuals=times + steps, solves=steps)
+
+    def _perturbed(self, estimate: int) -> int:
+        return estimate if self.steps is None else self.steps - self.cold.newton_iterations
 
     def _decades(self, h: float) -> float:
         """log rtol / log h, how often the perturbation must multiply itself to vanish."""

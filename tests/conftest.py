@@ -90,14 +90,18 @@ def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     return call
 
 
+def with_routes() -> dict[str, str]:
+    """The environment of this process, `routes` being the one beside its Python."""
+    return {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+
+
 def shell(command: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A command as a user types it, `routes` being the one of this environment."""
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    """A command as a user types it."""
     return subprocess.run(
         command,
         shell=True,
         cwd=cwd,
-        env={**os.environ, "PATH": path, **environment},
+        env={**with_routes(), **environment},
         capture_output=True,
         text=True,
         timeout=120,

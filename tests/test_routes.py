@@ -51,7 +51,7 @@ def differentiate(route: Route, problem: Problem, p: Array, **options) -> tuple[
     result = gradient(p)
     counted = model.tally.work - before
     state = Model(problem).solve(p)
-    steps = None if problem.linear else counted.newton_iterations - state.work.newton_iterations
+    steps = None if problem.linear else counted.newton_iterations
     forward = ForwardWork(state.work, problem.linear, model.solver.rtol, steps)
     return result, counted, route.cost(len(p), forward, **options)
 
@@ -108,7 +108,7 @@ def test_declared_work_holds_for_every_step_given_the_steps_taken(route: Route, 
     base = Model(bar).solve(p).work
     gradient = route.prepare(model, p, step=step, start=start)
     gradient(p)
-    steps = model.tally.work.newton_iterations - base.newton_iterations
+    steps = model.tally.work.newton_iterations
     assert route.cost(4, ForwardWork(base, steps=steps), step=step, start=start) == model.tally.work
 
 
@@ -232,8 +232,8 @@ def test_steps_that_leave_the_domain_are_refused_with_the_bound() -> None:
         differentiate(fd_central, bar, p, step=None, start="cold")
     differentiate(fd_one_sided, bar, p, step=None, start="cold")  # forward is free
     log = Bar()
-    with pytest.raises(DomainError, match="passes its bound 300"):
-        differentiate(fd_one_sided, log, np.full(8, 299.9), step=1e-2, start="cold")
+    with pytest.raises(DomainError, match="passes its bound 170"):
+        differentiate(fd_one_sided, log, np.full(8, 169.9), step=1e-2, start="cold")
     with pytest.raises(DomainError, match="does not change"):
         differentiate(fd_one_sided, log, np.ones(8), step=1e-17, start="cold")
 

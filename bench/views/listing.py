@@ -20,7 +20,7 @@ from routes.route import Route
 def listing(kind: registry.Kind) -> Group:
     """All problems or all routes, one block each."""
     blocks: list[Any] = [Text(f"{kind}s", style="bold")]
-    for entry in registry.entries(kind).values():
+    for entry in registry.registered(kind):
         blocks.append(Padding(_block(kind, entry), (0, 0, 1, 2), expand=False))
     return Group(*blocks)
 
@@ -28,6 +28,8 @@ def listing(kind: registry.Kind) -> Group:
 def _block(kind: registry.Kind, entry: registry.Entry) -> Group:
     origin = "" if entry.origin == registry.BUILT_IN else f"  (from {entry.origin})"
     name = Text(entry.name + origin, style=f"bold {route_style(entry.name)}")
+    if registry.entries(kind)[entry.name] is not entry:
+        return Group(name, Text(f"hidden by the {kind} of the same name above", style="red"))
     options = Table(box=None, pad_edge=False, show_header=False)
     options.add_column(no_wrap=True)
     options.add_column()

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -30,6 +31,16 @@ def console(stderr: bool = False) -> Console:
     return Console(stderr=stderr, width=None if stream.isatty() else PIPED_WIDTH, highlight=False, emoji=False)
 
 
+def show(out: Console, table: Table) -> None:
+    """Print a table whole: too wide for the terminal, it folds where columns allow it; at worst lines wrap."""
+    unlimited = out.options.update(width=10_000)
+    if Measurement.get(out, unlimited, table).maximum > out.width:
+        for column in table.columns:
+            column.width = column.min_width  # where there is none, the column stays as wide as its cells
+    out.width = max(out.width, Measurement.get(out, unlimited, table).maximum)
+    out.print(table)
+
+
 def results(rows: Sequence[Row]) -> Table:
     """One line a case under the line of its problem: the bill, and how wrong the gradient is."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
@@ -37,9 +48,9 @@ def results(rows: Sequence[Row]) -> Table:
     table.add_column("problem\n  route", overflow="fold", min_width=14)
     for name in ("n_u", "n_p", "J", "error", "time", "x fwd"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("work", overflow="fold")
+    table.add_column("work", overflow="fold", min_width=7)
     for name in ("memory", "tape"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", min_width=6)
     if several:
         table.add_column("error against", overflow="fold", min_width=7)
     before = None
@@ -117,7 +128,7 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
 def gradient(row: Row, view: View) -> Table:
     """Parameter by parameter: the route's gradient beside the reference and what the problem adds."""
     title = f"{named('problem', row)} by {named('route', row)}"
-    table = Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="bold")
+    table = Table(box=None, pad_edge=False, title=Text(title), title_justify="left", title_style="bold")
     reference = view.reference
     table.add_column("p", no_wrap=True)
     table.add_column("dJ/dp", justify="right", style=route_style(row["route"]))
@@ -139,5 +150,5 @@ def gradient(row: Row, view: View) -> Table:
         values += [column[i] for column in view.columns.columns.values()]
         mark = [] if blind is None else ["blind" if blind[i] else ""]
         hidden = blind is not None and blind[i]
-        table.add_row(view.labels[i], *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
+        table.add_row(Text(view.labels[i]), *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
     return table

@@ -15,7 +15,7 @@ STEP = EPS ** (1 / 5)  # balances the truncation h^4 against the round-off eps /
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return (4 * n_p) * forward.cold
+    return forward.solves(4 * n_p)
 
 
 @route("fd-extrapolated", needs=Offers.VALUE, cost=cost)
