@@ -14,7 +14,7 @@ from routes.model import Model
 from routes.newton import ForwardWork, State
 from routes.tally import Work
 
-REPEATS, SHORT = 3, 0.1  # the first call of anything is slow: repeat calls that take less than SHORT seconds
+SHORT, LONG = 1.0, 10.0  # [s] the first call of anything is slow (compilation): 3 more are timed, 1 more, or none
 
 
 @dataclass(frozen=True)
@@ -39,18 +39,18 @@ def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
         seconds, _ = price_of(lambda: model.value(p))
         return Prices(seconds, 0.0, 0.0, ForwardWork(Work(forward_solves=1))), None
     forward, state = price_of(lambda: model.solve(p))
-    R_u = problem.tangent(state.u, p)
+    R_u = model.tangent_operator(state)
+    declared = ForwardWork(state.work, problem.linear, model.solver.rtol, matrix_free=problem.matrix_free)
     solve, _ = price_of(lambda: state.factors.solve(state.u))
     matvec, _ = price_of(lambda: R_u @ state.u)
-    return Prices(forward, solve, matvec, ForwardWork(state.work, problem.linear, model.solver.rtol)), state
+    return Prices(forward, solve, matvec, declared), state
 
 
 def price_of(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Median seconds of a call, repeated where it is short, and what it returned."""
-    seconds, result = seconds_of(call)
-    if seconds < SHORT:
-        seconds = median(seconds_of(call)[0] for _ in range(REPEATS))
-    return seconds, result
+    """Median seconds of a call after a first one, where that is not too long, and what it returned."""
+    first, result = seconds_of(call)
+    repeats = 3 if first < SHORT else 1 if first < LONG else 0
+    return median([seconds_of(call)[0] for _ in range(repeats)] or [first]), result
 
 
 def unaffordable(seconds: float, tape: float | None, work: Work, budget: float) -> str | None:

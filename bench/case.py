@@ -49,7 +49,15 @@ def routes(selectors: Iterable[str]) -> list[RouteSpec]:
     return specs
 
 
+def left_out(problem_selectors: Iterable[str], route_selectors: Iterable[str]) -> list[str]:
+    """Why entries that `all` would name are not among them."""
+    kinds: dict[registry.Kind, Iterable[str]] = {"problem": problem_selectors, "route": route_selectors}
+    entries = [entry for kind, texts in kinds.items() if "all" in texts for entry in registry.entries(kind).values()]
+    return [failure for entry in entries if (failure := entry.failure) is not None]
+
+
 def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str, dict[str, Any], Any]]:
+    seen: list[tuple[str, dict[str, Any]]] = []
     for text in selectors:
         chosen = selector.parse(text)
         if chosen.name == "all":
@@ -61,7 +69,10 @@ def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str,
         for name in names:
             target = registry.find(kind, name).load()
             for given in chosen.expand():
-                yield name, options.resolve(registry.factory_of(target), given, name), target
+                resolved = options.resolve(registry.factory_of(target), given, name)
+                if (name, resolved) not in seen:
+                    seen.append((name, resolved))
+                    yield name, resolved, target
 
 
 def point(problem: Problem, at: str) -> Array:

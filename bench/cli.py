@@ -6,6 +6,7 @@ import io
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from problems.errors import DomainError, InputError
 if TYPE_CHECKING:
     from bench.rows import Row
     from bench.runner import Outcome, View
+    from routes.factorization import LinearSolver
 
 WRONG_USAGE, INTERRUPTED = 2, 130
 STORE = Path("results") / "routes.sqlite"
@@ -31,7 +33,7 @@ class Routes(click.Group):
             return super().invoke(ctx)
         except (InputError, DomainError) as error:
             if debugging():
-                raise
+                traceback.print_exc()
             complain(str(error))
             ctx.exit(WRONG_USAGE)
         except click.UsageError as error:
@@ -45,7 +47,7 @@ class Routes(click.Group):
             raise  # click ends quietly: whoever read has read enough
         except OSError as error:
             if debugging():
-                raise
+                traceback.print_exc()
             complain(f"{error.strerror or error} - check where the output goes")
             ctx.exit(WRONG_USAGE)
 
@@ -103,7 +105,7 @@ def list_(what: str | None) -> None:
         out.print(listing("route"))
 
 
-SELECTOR = "NAME, NAME[key=value,key=a|b] or all; repeatable."
+SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
 BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 
@@ -114,6 +116,9 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 @click.option("--at", default="start", show_default=True, metavar="start|true|FILE.csv", help=AT)
 @click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
 @click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
+@click.option("--rtol", type=float, default=1e-12, show_default=True, help="Forward solve: |R| relative to its start.")
+@click.option("--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most.")
+@click.option("--linear-solver", type=click.Choice(["auto", "pardiso", "superlu"]), default="auto", show_default=True)
 @click.option("--gradient", is_flag=True, help="Show the gradient parameter by parameter beside its reference.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
 @store_option
@@ -125,6 +130,9 @@ def run(
     at: str,
     budget: float,
     min_time: float,
+    rtol: float,
+    max_steps: int,
+    linear_solver: LinearSolver,
     gradient: bool,
     as_json: bool,
     store: Path,
@@ -140,13 +148,19 @@ def run(
     from bench.runner import Settings
     from bench.runner import run as run_cases
     from bench.store import Store
+    from routes.newton import Solver
 
     if not budget > 0:
         raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
+    if not 0 < rtol < 1 or max_steps < 1:
+        raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
-    outcomes = run_cases(problem_specs, route_specs, Settings(at, budget, min_time, gradient))
+    for left_out in case.left_out(problems, routes):
+        complain(f"left out of 'all': {left_out}")
+    solver = Solver(rtol, max_steps, linear_solver)
+    outcomes = run_cases(problem_specs, route_specs, Settings(at, budget, min_time, gradient, solver))
     kept = None if no_store else Store(store)
     if kept is not None:
         kept.check_writable()
@@ -165,7 +179,8 @@ def run(
                 click.echo(json_line(outcome.row))
     finally:  # an interrupt leaves what was measured on the screen, too
         if not as_json:
-            show([o.row for o in done], [(o.row, o.view) for o in done if o.view is not None])
+            views = [(o.row, o.view) for o in done if o.view is not None]
+            show([o.row for o in done], views, None if no_store or lost else store)
     if lost:
         raise InputError(f"{len(lost)} of {len(done)} rows were not kept: {lost[0]}")
     if debugging():
@@ -174,7 +189,7 @@ def run(
         sys.exit(1)
 
 
-def show(rows: list[Row], views: Iterable[tuple[Row, View]] = ()) -> None:
+def show(rows: list[Row], views: Iterable[tuple[Row, View]] = (), kept: Path | None = None) -> None:
     """The table, the reasons and notes below it, the gradients where they were asked for."""
     from bench.views import tables
 
@@ -184,6 +199,8 @@ def show(rows: list[Row], views: Iterable[tuple[Row, View]] = ()) -> None:
     tables.show(out, tables.results(rows))
     for line in tables.remarks(rows):
         out.print(line, soft_wrap=not out.is_terminal)
+    if kept is not None:
+        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
     for row, view in views:
         out.print()
         tables.show(out, tables.gradient(row, view))
@@ -203,16 +220,17 @@ def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
 
 @main.command()
 @click.option("--table", type=click.Choice(["cases", "samples", "environments"]), default="cases", show_default=True)
-@click.option("--format", "format", type=click.Choice(["csv", "parquet", "json"]), default="csv", show_default=True)
+@click.option("--format", type=click.Choice(["csv", "parquet", "json"]), help="[that of FILE's name, else csv]")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write [stdout].")
 @store_option
 @debug_option
-def export(table: str, format: str, output: Path | None, store: Path) -> None:
+def export(table: str, format: str | None, output: Path | None, store: Path) -> None:
     """Tables of the store as CSV, Parquet or JSON (one array of row objects)."""
     from bench.export import export as write
     from bench.store import Store
 
-    write(Store(store), table, format, output)
+    named = output.suffix.lstrip(".") if output is not None else ""
+    write(Store(store), table, format or (named if named in ("parquet", "json") else "csv"), output)
 
 
 @main.command()

@@ -77,7 +77,17 @@ def entries(kind: Kind) -> dict[str, Entry]:
 
 
 # the order of the story: from nothing but J to the whole structure
-ORDER = ("bar", "fd-one-sided", "fd-central", "complex-step", "tangent", "adjoint", "unrolled-ad", "implicit-ad")
+ORDER = (
+    "bar",
+    "block",
+    "fd-one-sided",
+    "fd-central",
+    "complex-step",
+    "tangent",
+    "adjoint",
+    "unrolled-ad",
+    "implicit-ad",
+)
 
 
 def find(kind: Kind, name: str) -> Entry:

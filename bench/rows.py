@@ -42,6 +42,7 @@ COLUMNS = (
     Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2"),
     Column("reference", "TEXT", "", "where g_ref comes from"),
     Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved by the forward solve"),
+    Column("linear_solver", "TEXT", "", "factorization behind the forward solve"),
     Column("prepare_s", "REAL", "s", "preparation: problem, imports, compilation"),
     Column("first_s", "REAL", "s", "first call of the gradient"),
     Column("seconds", "REAL", "s", "gradient, median of the steady calls"),

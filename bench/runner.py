@@ -176,11 +176,12 @@ class Workbench:
         before = model.tally.work
         row["first_s"], result = seconds_of(lambda: gradient(self.p))
         work = model.tally.work - before
-        declared = route.cost(len(self.p), replace(self.prices.declared, steps=work.newton_iterations), **options)
+        declared = route.cost(len(self.p), replace(self.prices.declared, counted=work), **options)
         row |= {"work": asdict(work), "predicted_work": asdict(declared)}
         if work != declared:
             _note(row, f"{route.name}: counted work differs from the declared")
         self._judge(route, result, row)
+        self._note_factors(row)
         forward = self._forward()
         if row["first_s"] < LONG:
             row["peak_bytes"], row["memory_method"] = peak_of(lambda: gradient(self.p))
@@ -199,6 +200,13 @@ class Workbench:
             "status": "ok",
         }
         return Outcome(row, samples, self._view(route, result))
+
+    def _note_factors(self, row: Row) -> None:
+        state = self._price()[1]
+        if state is not None:
+            row["linear_solver"] = state.factors.name
+            if self.problem.structure == "spd" and "L D L^T" in state.factors.name:
+                _note(row, "R_u is not positive definite at u: factorized as L D L^T (a buckled state?)")
 
     def _judge(self, route: Route, result: Result, row: Row) -> None:
         """Fill in J, the gradient and its error; raise Failure for numbers that are none."""

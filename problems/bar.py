@@ -48,7 +48,7 @@ class Bar(Problem):
         self,
         *,
         n: Annotated[int, "number of elements N"] = 8,
-        sensors: Annotated[Nodes | None, "5: nodes 1..5; 1,3,5 or 2..6: these; 0: none [nodes 1..min(5, n)]"] = None,
+        sensors: Annotated[Nodes | None, "5: nodes 1 to 5; 1,3,5 or 2..6 or 5..5: these; 0: none [the first 5]"] = None,
         parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
         data: Annotated[str | None, "CSV file of measurements, columns node,displacement [synthetic]"] = None,
         noise: Annotated[float, "standard deviation added to synthetic data [m]"] = 0.0,
@@ -185,8 +185,9 @@ class Bar(Problem):
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         """Forward strain and, for the adjoint, adjoint strain: dJ/dE_e = A L_e eps_e[u] eps_e[lam] (data term)."""
         eps = difference(u) / self.L_e
-        columns = {"x [m]": self.x, "E [Pa]": self.modulus(p), "strain eps[u]": eps}
+        columns = {"x": self.x, "E": self.modulus(p), "eps[u]": eps}
         if lam is not None:
             eps_lam = difference(lam) / self.L_e
-            columns |= {"adjoint strain eps[lam] [m/N]": eps_lam, "A L_e eps[u] eps[lam]": A * self.L_e * eps * eps_lam}
-        return ParameterView(columns, blind=np.arange(self.n_state) >= self.last_sensor)
+            columns |= {"eps[lam]": eps_lam, "A L_e eps eps": A * self.L_e * eps * eps_lam}
+        mark = "blind, alpha Phi only" if self.alpha else "blind"
+        return ParameterView(columns, np.arange(self.n_state) >= self.last_sensor, mark)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from problems.errors import InputError
-from problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
+from problems.problem import Array, Linearization, Offers, Operator, Parameters, Problem, Traced
+
+if TYPE_CHECKING:
+    from problems.elements import CompiledResidual
 
 THETA_MAX = 300.0
 
@@ -29,6 +32,8 @@ class Block(Problem):
     name = "block"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     structure = "spd"
+    offset = 1.0  # positions, of the unit cube
+    matrix_free = True
 
     def __init__(
         self,
@@ -96,7 +101,7 @@ class Block(Problem):
         top = FacetBasis(self.mesh, ElementHex1(), facets=self.mesh.facets_satisfying(lambda x: x[2] == 1.0))
         area = np.zeros(self.mesh.p.shape[1])  # [m^2] that every node carries
         for a in range(top.Nbfun):
-            np.add.at(area, top.element_dofs[a], (top.basis[a][0].value * top.dx).sum(axis=1))
+            np.add.at(area, top.element_dofs[a], (np.asarray(top.basis[a][0]) * top.dx).sum(axis=1))
         f = np.zeros(self.n_state)
         loaded = area > 0
         f[self.free[loaded, 2]] = self.traction * area[loaded]
@@ -118,24 +123,23 @@ class Block(Problem):
 
         return lame(xp.exp(p) if self.log else p, self.nu)
 
-    def initial(self, p: Array) -> Array:
-        return np.zeros(self.n_state, dtype=p.dtype)
+    def load(self, p: Array) -> Array:
+        return np.asarray(self.f)
 
     @cached_property
-    def _functions(self) -> tuple[Any, Any, Any]:
-        """R, R_p v and R_p^T lam, compiled."""
-        from problems.jax64 import jax
+    def _compiled(self) -> CompiledResidual:
+        from problems.elements import CompiledResidual
 
-        R = self.traced().residual
-        forward = jax.jit(lambda u, p, v: jax.jvp(lambda p: R(u, p), (p,), (v,))[1])
-        reverse = jax.jit(lambda u, p, lam: jax.vjp(lambda p: R(u, p), p)[1](lam)[0])
-        return jax.jit(R), forward, reverse
+        return CompiledResidual(self.traced().residual)
 
     def residual(self, u: Array, p: Array) -> Array:
-        return np.asarray(self._functions[0](u, p))
+        return self._compiled(u, p)
 
     def tangent(self, u: Array, p: Array) -> Any:
         return self.solid.tangent(u, self.constants(p))
+
+    def tangent_operator(self, u: Array, p: Array) -> Operator:
+        return self._compiled.by_u(u, p)
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 sum over the top nodes of |u - (0, 0, 0.2)|^2 [m^2]."""
@@ -144,11 +148,7 @@ class Block(Problem):
     def linearize(self, u: Array, p: Array) -> Linearization:
         J_u = np.zeros_like(u)
         J_u[self.top] = u[self.top] - self.d
-        from problems.elements import TracedJacobian
-
-        _, forward, reverse = self._functions
-        R_p = TracedJacobian(lambda v: forward(u, p, v), lambda lam: reverse(u, p, lam))
-        return Linearization(R_p, J_u, np.zeros_like(p))
+        return Linearization(self._compiled.by_p(u, p), J_u, np.zeros_like(p))
 
     def traced(self) -> Traced:
         from problems.elements import gradient

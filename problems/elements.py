@@ -126,6 +126,26 @@ class TracedJacobian:
         return np.asarray(self.forward(v))
 
 
+class CompiledResidual:
+    """A traced R(u, p) compiled, with products of its Jacobians for NumPy callers."""
+
+    def __init__(self, R: Callable[[Any, Any], Any]) -> None:
+        self._R = jax.jit(R)
+        self._R_u_v = jax.jit(lambda u, p, v: jax.jvp(lambda u: R(u, p), (u,), (v,))[1])
+        self._R_u_T_w = jax.jit(lambda u, p, w: jax.vjp(lambda u: R(u, p), u)[1](w)[0])
+        self._R_p_v = jax.jit(lambda u, p, v: jax.jvp(lambda p: R(u, p), (p,), (v,))[1])
+        self._R_p_T_w = jax.jit(lambda u, p, w: jax.vjp(lambda p: R(u, p), p)[1](w)[0])
+
+    def __call__(self, u: Array, p: Array) -> Array:
+        return np.asarray(self._R(u, p))
+
+    def by_u(self, u: Array, p: Array) -> TracedJacobian:
+        return TracedJacobian(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_T_w(u, p, w))
+
+    def by_p(self, u: Array, p: Array) -> TracedJacobian:
+        return TracedJacobian(lambda v: self._R_p_v(u, p, v), lambda w: self._R_p_T_w(u, p, w))
+
+
 def gradient(f: Callable[..., Any], argument: int) -> Callable[..., Any]:
     """The derivative of a scalar function by one of its arguments, holomorphic where any of them is complex."""
 

@@ -159,7 +159,9 @@ class Problem:
     offers     what the methods below provide; a route needing more is skipped with a reason
     n_state    n_u, the number of free unknowns (0 for a black box)
     linear     R is affine in u: one Newton step solves it
+    offset     |X| where R is a function of X + u, as positions are: rounding is then relative to that
     structure  of R_u: "spd", "symmetric" (indefinite) or "general"
+    matrix_free  tangent_operator gives products with R_u without assembling it
     notes      sentences a user should read beside the result
     """
 
@@ -168,7 +170,9 @@ class Problem:
     offers: Offers = Offers.VALUE
     n_state: int = 0
     linear: bool = False
+    offset: float = 0.0
     structure: Structure = "general"
+    matrix_free: bool = False
     notes: tuple[str, ...] = ()
 
     def value(self, p: Array) -> float:
@@ -179,6 +183,10 @@ class Problem:
         """The state (n_u,) a cold forward solve starts from, of p's dtype."""
         return np.zeros(self.n_state, dtype=p.dtype)
 
+    def load(self, p: Array) -> Array | None:
+        """The dead load f (n_u,) in R = f_int - f, by which a solve may proceed in steps; None if there is none."""
+        return None
+
     def residual(self, u: Array, p: Array) -> Array:
         """R(u, p), (n_u,)."""
         raise NotOffered(f"{self.name}: offers no residual R(u, p)")
@@ -186,6 +194,10 @@ class Problem:
     def tangent(self, u: Array, p: Array) -> Any:
         """R_u(u, p): a Chain, a SciPy sparse matrix or an (n_u, n_u) array."""
         raise NotOffered(f"{self.name}: offers no tangent R_u")
+
+    def tangent_operator(self, u: Array, p: Array) -> Operator:
+        """R_u for products only, unassembled; offered where `matrix_free` says so."""
+        raise NotOffered(f"{self.name}: offers no unassembled products with R_u")
 
     def objective(self, u: Array, p: Array) -> Any:
         """J(u, p), a real number (complex where u or p is)."""
@@ -218,7 +230,8 @@ class Problem:
 
 @dataclass(frozen=True)
 class ParameterView:
-    """Columns (n_p,) to show beside a gradient, and the parameters no datum can see."""
+    """Columns (n_p,) to show beside a gradient, and which parameters no datum can see, marked as such."""
 
     columns: Mapping[str, Array] = field(default_factory=dict)
     blind: Array | None = None
+    mark: str = "blind"

@@ -72,7 +72,9 @@ def _nodes_from_text(text: str, n: int, who: str) -> int | list[int]:
                 f"{who}: sensors={text}: {item.strip()!r} is no node - write 5 (the first 5), 1,3,5 or 2..6"
             )
         stop = int(last) if dots else int(first)
-        if stop > n or int(first) > stop:
+        if int(first) > stop:
+            raise InputError(f"{who}: sensors={text}: {item.strip()} runs backwards - write {stop}..{first}")
+        if stop > n or int(first) < 1:
             raise InputError(f"{who}: sensors={text}: {item.strip()} leaves the nodes 1..{n} - choose nodes among them")
         nodes.extend(range(int(first), stop + 1))
     return nodes

@@ -33,6 +33,8 @@ def read_columns(path: str | Path, names: tuple[str, ...] | None) -> dict[str, A
     if twice:
         raise InputError(f"{path}: column {twice[0]} is given {header.count(twice[0])} times - keep one")
     missing = [name for name in wanted if name not in header]
+    if missing and len(header) == 1 and ";" in header[0]:
+        raise InputError(f"{path}: its columns are separated by ';' - separate them by ','")
     if missing:
         raise InputError(f"{path}: no column {', '.join(missing)}; it has {', '.join(header)} - rename or add it")
     columns = {name: np.empty(len(rows) - 1) for name in wanted}

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from problems.problem import Array
 from routes.model import Model
+from routes.refinement import Factors, LinearizedSolver, work
 from routes.route import ForwardWork, Offers, Result, Work, route
 
 
-def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return forward.cold + forward.factors_at_solution() + Work(transposed_solves=1)
+def cost(n_p: int, forward: ForwardWork, *, factors: str) -> Work:
+    return work(forward, 1, transposed=True, factors=factors)
 
 
 @route("adjoint", needs=Offers.LINEARIZE, cost=cost)
-def adjoint(model: Model, p: Array) -> Result:
+def adjoint(model: Model, p: Array, *, factors: Factors = "refined") -> Result:
     """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p."""
     state = model.solve(p)
     lin = model.linearize(state)
-    lam = model.solve_transposed(model.factors_at(state), -lin.J_u)
+    lam = LinearizedSolver(model, state, factors).solve_transposed(-lin.J_u)
     return Result(state.J, lin.J_p + lin.R_p.T @ lam, state.u, state.residual, lam)

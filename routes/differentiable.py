@@ -10,6 +10,7 @@ import numpy as np
 from problems.jax64 import jax, jnp
 from routes.model import Model
 from routes.newton import State
+from routes.refinement import LinearizedSolver
 
 
 class Solved:
@@ -27,11 +28,13 @@ jax.tree_util.register_pytree_node(
 )
 
 
-def differentiable_solve(model: Model, on_solved: Callable[[Solved], None] | None = None) -> Callable[[Any], Any]:
+def differentiable_solve(
+    model: Model, factors: str = "refined", on_solved: Callable[[Solved], None] | None = None
+) -> Callable[[Any], Any]:
     """p -> u(p) with R(u, p) = 0, to be differentiated by jax.grad or jax.vjp, eagerly (not under jit).
 
     The implicit function theorem is its pullback: u_bar -> R_p^T lam with R_u^T lam = -u_bar, one transposed
-    solve with factors of R_u at u. `on_solved` is told each state that a gradient will reuse.
+    solve with `factors` as LinearizedSolver takes them. `on_solved` is told each state that a gradient will reuse.
     """
     residual = model.traced.residual
     R_p_transposed = jax.jit(lambda u, p, lam: jax.vjp(lambda p: residual(u, p), p)[1](lam)[0])
@@ -47,7 +50,7 @@ def differentiable_solve(model: Model, on_solved: Callable[[Solved], None] | Non
         return jnp.asarray(solved.state.u), solved
 
     def backward(solved: Solved, u_bar: Any) -> tuple[Any]:
-        lam = model.solve_transposed(model.factors_at(solved.state), -np.asarray(u_bar))
+        lam = LinearizedSolver(model, solved.state, factors).solve_transposed(-np.asarray(u_bar))
         return (R_p_transposed(solved.state.u, solved.state.p, lam),)
 
     solve.defvjp(forward, backward)

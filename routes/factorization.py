@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import importlib.util
 import warnings
-from typing import Any, Protocol
+import weakref
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from problems.chain import Chain, cumulative_sum
-from problems.errors import SingularMatrix
+from problems.errors import InputError, SingularMatrix
 from problems.problem import Array
 from problems.sparse import SymmetricSparse
 
+LinearSolver = Literal["auto", "pardiso", "superlu"]
+IDLE = 2  # analyses kept for reuse, a pattern
+
 
 class Factorization(Protocol):
-    """Factors of A. norm is |A|_inf or a bound of it."""
+    """Factors of A. name says of which kind, norm is |A|_inf or a bound of it."""
 
+    name: str
     norm: float
 
     def solve(self, b: Array) -> Array:
@@ -27,19 +33,43 @@ class Factorization(Protocol):
         ...
 
 
-def factorize(A: Any, who: str) -> Factorization:
-    """Factorize A: a Chain, a dense array or a SciPy sparse matrix. Raises SingularMatrix."""
-    if isinstance(A, Chain):
-        return ChainFactorization(A, who)
-    if isinstance(A, SymmetricSparse):
-        return PardisoFactorization(A, who)
-    if isinstance(A, np.ndarray):
-        return DenseFactorization(A, who)
-    return SparseFactorization(A, who)
+class Factorizer:
+    """Makes factorizations; sparse symmetric ones by MKL PARDISO where it is installed, else by SuperLU.
+
+    A pattern is analyzed once: factors that nobody holds any more leave their analysis to the next ones.
+    """
+
+    def __init__(self, linear_solver: LinearSolver = "auto") -> None:
+        have_pardiso = importlib.util.find_spec("pymklpardiso") is not None
+        if linear_solver == "pardiso" and not have_pardiso:
+            raise InputError("linear solver pardiso: py-mkl-pardiso is not installed - pip install it or take superlu")
+        self.pardiso = have_pardiso and linear_solver != "superlu"
+        self._idle: weakref.WeakKeyDictionary[Any, dict[int, list[Any]]] = weakref.WeakKeyDictionary()
+
+    def __call__(self, A: Any, who: str) -> Factorization:
+        """Factorize A: a Chain, a SymmetricSparse, a dense array or a SciPy sparse matrix. Raises SingularMatrix."""
+        if isinstance(A, Chain):
+            return ChainFactorization(A, who)
+        if isinstance(A, SymmetricSparse):
+            return self._symmetric(A, who) if self.pardiso else SparseFactorization(A.full(), who)
+        if isinstance(A, np.ndarray):
+            return DenseFactorization(A, who)
+        return SparseFactorization(A, who)
+
+    def _symmetric(self, A: SymmetricSparse, who: str) -> Factorization:
+        idle = self._idle.setdefault(A.pattern, {})
+        if np.iscomplexobj(A.data):
+            return PardisoFactorization(A, who, "complex L D L^T", COMPLEX_SYMMETRIC, idle)
+        try:
+            return PardisoFactorization(A, who, "L L^T", POSITIVE_DEFINITE, idle)
+        except SingularMatrix:  # not positive definite: a buckled state, say
+            return PardisoFactorization(A, who, "L D L^T", SYMMETRIC, idle)
 
 
 class ChainFactorization:
     """K = B^T D B is its own factorization: K^{-1} b = B^{-1} D^{-1} B^{-T} b, two cumulative sums."""
+
+    name = "cumulative sums"
 
     def __init__(self, K: Chain, who: str) -> None:
         bad = np.flatnonzero(~(K.D.real > 0))
@@ -58,6 +88,8 @@ class ChainFactorization:
 
 class DenseFactorization:
     """P A = L U of LAPACK."""
+
+    name = "LAPACK L U"
 
     def __init__(self, A: Array, who: str) -> None:
         from scipy.linalg import LinAlgWarning, lu_factor
@@ -84,6 +116,8 @@ class DenseFactorization:
 class SparseFactorization:
     """SuperLU's P_r A P_c = L U."""
 
+    name = "SuperLU L U"
+
     def __init__(self, A: Any, who: str) -> None:
         from scipy.sparse.linalg import splu
 
@@ -100,20 +134,38 @@ class SparseFactorization:
         return np.asarray(self.lu.solve(b, "T"))
 
 
+POSITIVE_DEFINITE, SYMMETRIC, COMPLEX_SYMMETRIC = 2, -2, 6  # PARDISO's matrix types
+
+
 class PardisoFactorization:
-    """A = L L^T of MKL PARDISO."""
+    """Sparse factors of a symmetric matrix by MKL PARDISO; not Hermitian where complex."""
 
-    def __init__(self, A: SymmetricSparse, who: str) -> None:
-        import pymklpardiso as pardiso
+    def __init__(self, A: SymmetricSparse, who: str, kind: str, mtype: int, idle: dict[int, list[Any]]) -> None:
+        from pymklpardiso import PardisoSolver
 
-        mtype = pardiso.MTYPE_COMPLEX_SYM if np.iscomplexobj(A.data) else pardiso.MTYPE_REAL_SYM_POSDEF
+        waiting = idle.setdefault(mtype, [])
         try:
-            self.solver = pardiso.PardisoSolver(A.upper, mtype)
+            if waiting:
+                self.solver = waiting.pop()
+                self.solver.refactor(A.data)
+            else:
+                self.solver = PardisoSolver(A.upper, mtype)
         except RuntimeError as error:
-            raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check the constraints") from error
+            raise SingularMatrix(f"{who}: R_u ({A.pattern.n} unknowns) has no {kind}: {error} - check p") from error
+        self.name = f"PARDISO {kind}"
         self.norm = A.norm
+        weakref.finalize(self, _keep, waiting, self.solver)
 
     def solve(self, b: Array) -> Array:
-        return np.asarray(self.solver.solve(b))
+        return np.asarray(self.solver.solve(np.ascontiguousarray(b, dtype=self._dtype)))
 
     solve_transposed = solve
+
+    @property
+    def _dtype(self) -> Any:
+        return np.complex128 if self.solver.mtype == COMPLEX_SYMMETRIC else np.float64
+
+
+def _keep(waiting: list[Any], solver: Any) -> None:
+    if len(waiting) < IDLE:
+        waiting.append(solver)

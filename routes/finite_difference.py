@@ -100,6 +100,6 @@ def objective_near(model: Model, p: Array, start: str) -> tuple[Callable[[Array]
     """J as a function for points near p, and J(p) where finding that function took a solve at p."""
     if start == "cold":
         return model.value, None
-    base = model.solve(p)
+    base = model.solve(p, polish=1)  # else what is left of its residual, 1e-12, is divided by h = 1e-8
     factors = base.factors if start == "chord" else None
     return lambda q: float(model.solve(q, base, factors).J), float(base.J)

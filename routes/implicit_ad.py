@@ -7,22 +7,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from problems.problem import Array
-from routes.adjoint import cost
 from routes.model import Model
-from routes.route import Gradient, Offers, Result, route
+from routes.refinement import Factors, work
+from routes.route import ForwardWork, Gradient, Offers, Result, Work, route
 
 if TYPE_CHECKING:
     from routes.differentiable import Solved
 
 
+def cost(n_p: int, forward: ForwardWork, *, factors: str) -> Work:
+    return work(forward, 1, transposed=True, factors=factors)
+
+
 @route("implicit-ad", needs=Offers.SOLVE | Offers.TRACE, cost=cost, staged=True)
-def implicit_ad(model: Model, p: Array) -> Gradient:
+def implicit_ad(model: Model, p: Array, *, factors: Factors = "refined") -> Gradient:
     """dJ/dp = vjp of p -> J(u(p), p), the pullback of u(p) being one adjoint solve (jax.custom_vjp)."""
     from problems.jax64 import jax
     from routes.differentiable import differentiable_solve, held_bytes
 
     solved: list[Solved] = []
-    solve = differentiable_solve(model, solved.append)
+    solve = differentiable_solve(model, factors, solved.append)
     objective = jax.jit(model.traced.objective)
 
     def gradient(p: Array) -> Result:

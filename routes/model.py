@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from problems.errors import NotConverged, SingularMatrix
 from problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
-from routes.factorization import Factorization, factorize
+from routes.continuation import by_load_steps
+from routes.factorization import Factorization, Factorizer
 from routes.newton import Solver, State, Step, newton, norm
 from routes.tally import Tally
 
@@ -20,6 +22,7 @@ class Model:
         self.problem = problem
         self.solver = solver or Solver()
         self.tally = Tally()
+        self._factorize = Factorizer(self.solver.linear_solver)
 
     @property
     def parameters(self) -> Parameters:
@@ -40,7 +43,7 @@ class Model:
 
     def factorize(self, A: Any) -> Factorization:
         self.tally.count("factorizations")
-        return factorize(A, self.problem.name)
+        return self._factorize(A, self._who)
 
     def matvec(self, A: Any, v: Array) -> Array:
         self.tally.count("matvecs")
@@ -64,6 +67,12 @@ class Model:
         """
         return state.factors if self.problem.linear else self.factorize(self.tangent(state.u, state.p))
 
+    def tangent_operator(self, state: State) -> Any:
+        """R_u at a solved state for products only: matrix-free where the problem can, else assembled."""
+        if self.problem.matrix_free:
+            return self.problem.tangent_operator(state.u, state.p)
+        return self.tangent(state.u, state.p)
+
     def newton_correction(self, factors: Factorization, R: Array) -> Array:
         self.tally.count("newton_iterations")
         return self.solve_linear(factors, R)
@@ -72,25 +81,52 @@ class Model:
         """R_p, J_u, J_p at a solved state: about a residual's worth, and of no kind that is counted."""
         return self.problem.linearize(state.u, state.p)
 
-    def solve(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> State:
+    def solve(
+        self, p: Array, start: State | None = None, factors: Factorization | None = None, polish: int = 0
+    ) -> State:
         """Solve R(u, p) = 0: cold, warm from the state `start`, by chord steps if `factors` are given.
 
-        p may be complex where the problem offers COMPLEX: the imaginary part, a derivative, converges one Newton
-        step behind the real part that is watched, so one more is taken. Raises NotConverged, SingularMatrix.
+        A cold solve that fails is tried again by load steps where the problem knows its load. `polish` Newton steps
+        are taken after convergence, on nonlinear problems. p may be complex where the problem offers COMPLEX.
+        Raises NotConverged, SingularMatrix.
         """
+        polish = 0 if self.problem.linear else polish
         before = self.tally.work
         self.tally.count("forward_solves")
+        u = self.problem.initial(p) if start is None else start.u.astype(p.dtype)
+        scale = None if start is None else start.scale
+        try:
+            u, history, scale, last = self._newton(u, p, scale, factors, polish=polish)
+        except (NotConverged, SingularMatrix):
+            load = self.problem.load(p) if start is None else None
+            if load is None:
+                raise
+            u = by_load_steps(lambda t, u: self._newton(u, p, norm(load), None, (1.0 - t) * load)[0], u, self._who)
+            u, history, scale, last = self._newton(u, p, norm(load), None, polish=polish)
+        J = self.problem.objective(u, p)
+        return State(p, u, J, history, scale, last, self.tally.work - before)
+
+    @property
+    def _who(self) -> str:
+        return self.problem.name
+
+    def _newton(
+        self,
+        u: Array,
+        p: Array,
+        scale: float | None,
+        factors: Factorization | None,
+        unloading: Any = 0.0,
+        polish: int = 0,
+    ) -> tuple[Array, tuple[float, ...], float, Factorization]:
+        """Newton's method on R + unloading, from u."""
         step = Step(
-            residual=lambda u: self.residual(u, p),
+            offset=self.problem.offset,
+            residual=lambda u: self.residual(u, p) + unloading,
             factorize=lambda u: self.factorize(self.tangent(u, p)),
             correct=self.newton_correction,
         )
-        u = self.problem.initial(p) if start is None else start.u.astype(p.dtype)
-        scale = None if start is None else start.scale
-        polish = int(np.iscomplexobj(p) and not self.problem.linear)
-        u, history, scale, last = newton(step, u, self.solver, self.problem.name, scale, factors, polish)
-        J = self.problem.objective(u, p)
-        return State(p, u, J, history, scale, last, self.tally.work - before)
+        return newton(step, u, self.solver, self._who, scale, factors, polish)
 
     def relative_residual(self, u: Array, p: Array) -> float:
         """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that was not solved for here: two residuals."""

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 
 from bench.cli import main
 from problems.bar import Bar
+from problems.block import Block
 from problems.problem import Array, Problem
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
@@ -31,7 +32,11 @@ from duffing.problem import Duffing  # noqa: E402
 
 EXACT = (tangent, adjoint, complex_step, implicit_ad)
 ROUTES = (fd_one_sided, fd_central, *EXACT, unrolled_ad)
+EVERY_FACTORS = [{"factors": f} for f in ("refined", "fresh")]
 OPTIONS = {
+    "tangent": EVERY_FACTORS,
+    "adjoint": EVERY_FACTORS,
+    "implicit-ad": EVERY_FACTORS,
     "fd-one-sided": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "unrolled-ad": [{"inner": i, "iterations": None} for i in ("cg", "richardson", "jacobi")],
@@ -50,7 +55,8 @@ BARS = {
 
 def zoo() -> dict[str, Problem]:
     """Every registered kind of problem, in small variants."""
-    return {name: Bar(**options) for name, options in BARS.items()} | {"duffing": Duffing()}
+    bars = {name: Bar(**options) for name, options in BARS.items()}
+    return bars | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[raw]": Block(n=2, parametrization="raw")}
 
 
 def somewhere(problem: Problem, seed: int = 0) -> Array:

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from problems.chain import BLOCKED_FROM, Chain, ElementForces, cumulative_sum, difference, divergence
 from problems.errors import SingularMatrix
-from routes.factorization import factorize
+from routes.factorization import Factorizer
+
+factorize = Factorizer()
 
 lengths = st.sampled_from([1, 2, 3, 17, BLOCKED_FROM - 1, BLOCKED_FROM, BLOCKED_FROM + 1, 64**2 + 64, 10_007])
 seeds = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT, shell
 
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-NUMBER = re.compile(r"(?<![\w.=\[-])[-+]?\d[\d.]*(e[-+]?\d+)?( (B|KiB|MiB|GiB|us|ms|s|min|h|d|y)\b)?")
+NUMBER = re.compile(r"(?<![\w.=\[-])<?[-+]?\d[\d.]*(e[-+]?\d+)?( (B|KiB|MiB|GiB|us|ms|s|min|h|d|y)\b)?")
 
 
 def blocks(document: str, language: str) -> list[str]:
@@ -42,7 +42,7 @@ def test_the_other_commands_of_the_readme_run(folder: Path) -> None:
     for block in blocks("README.md", "sh"):
         done = shell(f"set -e\n{block}", folder)
         assert (done.returncode, done.stderr) == (0, "")
-    assert (folder / "cases.csv").stat().st_size > 0 < (folder / "samples.parquet").stat().st_size
+    assert (folder / "results/cases.csv").stat().st_size > 0 < (folder / "results/samples.parquet").stat().st_size
 
 
 @pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])

@@ -41,18 +41,23 @@ def ids(value: object) -> str | None:
     return ",".join(str(v) for v in value.values() if v is not None) or "-" if isinstance(value, dict) else None
 
 
-def differentiate(route: Route, problem: Problem, p: Array, **options) -> tuple[Result, Work, Work]:
+TIGHT = Solver(rtol=1e-14)  # exact routes are exact to the forward tolerance, which is not what is tested here
+
+
+def differentiate(
+    route: Route, problem: Problem, p: Array, solver: Solver = TIGHT, **options
+) -> tuple[Result, Work, Work]:
     """The result, the work counted and the work declared: on a linear problem wholly before the run, on a nonlinear
     one given the number of Newton steps it took."""
-    model = Model(problem)
+    model = Model(problem, solver)
     options = route.resolve(model, p, **route.defaults | options)
     gradient = route.prepare(model, p, **options)
     before = model.tally.work
     result = gradient(p)
     counted = model.tally.work - before
-    state = Model(problem).solve(p)
-    steps = None if problem.linear else counted.newton_iterations
-    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, steps)
+    state = Model(problem, solver).solve(p)
+    known = None if problem.linear else counted
+    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, known, problem.matrix_free)
     return result, counted, route.cost(len(p), forward, **options)
 
 
@@ -61,7 +66,7 @@ def reference(problem: Problem, p: Array) -> Reference:
     own = problem.reference(p)
     if own is not None:
         return own
-    u, h = Model(problem).solve(p).u, 1e-30
+    u, h = Model(problem, TIGHT).solve(p, polish=1).u, 1e-30
     n_u, n_p = len(u), len(p)
     R = problem.residual
     R_u = np.column_stack([R(u + 1j * h * e, p + 0j).imag / h for e in np.eye(n_u)])
@@ -85,7 +90,7 @@ def test_every_route_gives_the_gradient(name: str, route: Route, options: dict) 
 @pytest.mark.parametrize(("name", "route", "options"), list(pairs()), ids=ids)
 def test_counted_work_is_the_declared_work(name: str, route: Route, options: dict) -> None:
     problem = ZOO[name]
-    _, counted, declared = differentiate(route, problem, problem.parameters.start, **options)
+    _, counted, declared = differentiate(route, problem, problem.parameters.start, Solver(), **options)
     assert counted == declared
 
 
@@ -93,7 +98,7 @@ def test_counted_work_is_the_declared_work(name: str, route: Route, options: dic
 @pytest.mark.parametrize("route", ROUTES, ids=ids)
 def test_declared_work_holds_for_every_size(route: Route, n: int) -> None:
     for options in OPTIONS.get(route.name, [{}])[: 1 if route is unrolled_ad and n > 5 else None]:
-        _, counted, declared = differentiate(route, Bar(n=n), np.zeros(n), **options)
+        _, counted, declared = differentiate(route, Bar(n=n), np.zeros(n), Solver(), **options)
         assert counted == declared
 
 
@@ -108,8 +113,7 @@ def test_declared_work_holds_for_every_step_given_the_steps_taken(route: Route, 
     base = Model(bar).solve(p).work
     gradient = route.prepare(model, p, step=step, start=start)
     gradient(p)
-    steps = model.tally.work.newton_iterations
-    assert route.cost(4, ForwardWork(base, steps=steps), step=step, start=start) == model.tally.work
+    assert route.cost(4, ForwardWork(base, counted=model.tally.work), step=step, start=start) == model.tally.work
 
 
 class BlackBox(Problem):
@@ -143,8 +147,12 @@ def test_the_table_of_bills() -> None:
     assert fd_central.cost(n, forward, step=None, start="cold").forward_solves == 2 * n
     assert fd_central.cost(n, forward, step=None, start="chord").factorizations == 1
     assert complex_step.cost(n, forward).forward_solves == n
-    assert tangent.cost(n, forward) == one + Work(solves=n)
-    assert adjoint.cost(n, forward) == implicit_ad.cost(n, forward) == one + Work(transposed_solves=1)
+    assert tangent.cost(n, forward, factors="refined") == one + Work(solves=n)
+    assert (
+        adjoint.cost(n, forward, factors="refined")
+        == implicit_ad.cost(n, forward, factors="refined")
+        == one + Work(transposed_solves=1)
+    )
     assert unrolled_ad.cost(n, forward, inner="cg", iterations=7).matvecs == 14
 
 
@@ -199,7 +207,7 @@ def test_the_adjoint_gradient_is_a_product_of_strains() -> None:
     p = somewhere(bar)
     result, _, _ = differentiate(adjoint, bar, p)
     view = bar.view(p, result.u, result.lam)
-    np.testing.assert_allclose(view.columns["A L_e eps[u] eps[lam]"] * np.exp(p), result.gradient, rtol=1e-14)
+    np.testing.assert_allclose(view.columns["A L_e eps eps"] * np.exp(p), result.gradient, rtol=1e-14)
     assert view.blind.tolist() == [False] * 5 + [True] * 3
 
 
@@ -246,7 +254,7 @@ def test_steps_that_are_none_are_wrong_usage(step: float) -> None:
 
 def test_a_solve_that_does_not_converge_says_how_far_it_came() -> None:
     problem = ZOO["duffing"]
-    with pytest.raises(NotConverged, match=r"duffing: not converged: .* after 2 steps") as caught:
+    with pytest.raises(NotConverged, match=r"duffing: not converged in 2 steps: ") as caught:
         Model(problem, Solver(max_steps=2)).solve(problem.parameters.start)
     assert len(caught.value.history) == 3
 

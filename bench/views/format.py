@@ -20,8 +20,11 @@ def seconds(value: float | None) -> str:
     return "" if value is None else duration(value)
 
 
-def bytes_(value: int | None) -> str:
-    return "" if value is None else size(value)
+def bytes_(value: int | None, resolution: int = 0) -> str:
+    """Below what can be resolved there is nothing to tell apart."""
+    if value is None:
+        return ""
+    return size(value) if value >= resolution else f"<{size(resolution)}"
 
 
 def selector(name: str, options: dict[str, Any], defaults: dict[str, Any]) -> str:

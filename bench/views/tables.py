@@ -22,6 +22,7 @@ from problems.errors import InputError
 from routes.tally import Work
 
 PIPED_WIDTH = 160  # columns where there is no terminal to ask
+RESOLUTION = 2**20  # bytes; pages of allocators and interpreters come and go below
 MANY = 64  # parameters; longer views show both ends
 
 
@@ -37,8 +38,9 @@ def show(out: Console, table: Table) -> None:
     if Measurement.get(out, unlimited, table).maximum > out.width:
         for column in table.columns:
             column.width = column.min_width  # where there is none, the column stays as wide as its cells
-    out.width = max(out.width, Measurement.get(out, unlimited, table).maximum)
-    out.print(table)
+    wide = console()
+    wide.width = max(out.width, Measurement.get(out, unlimited, table).maximum)
+    wide.print(table)
 
 
 def results(rows: Sequence[Row]) -> Table:
@@ -82,7 +84,7 @@ def _cells(row: Row) -> list[Text]:
             seconds(row["seconds"]),
             ratio(row["forward_ratio"]),
             _work(row, "work"),
-            bytes_(row["peak_bytes"]),
+            bytes_(row["peak_bytes"], RESOLUTION),
             bytes_(row["tape_bytes"]),
         ]
     else:
@@ -108,7 +110,10 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
     """A legend, reasons of skipped and failed cases, then notes, each once."""
     judges = references(rows)
     against = f" against the {judges[0]}" if len(judges) == 1 else ""
-    legend = f"error: |g - g_ref| / |g_ref|{against}; x fwd: time in forward solves\nwork: {LEGEND}"
+    legend = (
+        f"n_u unknowns, n_p parameters; error: |g - g_ref| / |g_ref|{against}; time: one gradient, x fwd: in forward"
+        f" solves\nwork: {LEGEND}; memory: peak of one call; tape: kept by AD for its backward sweep"
+    )
     lines = {"": Text(legend, style="dim")}
     problems = {id(row): named("problem", row) for row in rows}
     several = len(set(problems.values())) > 1
@@ -148,7 +153,7 @@ def gradient(row: Row, view: View) -> Table:
         values: list[Any] = [view.gradient[i]]
         values += [] if reference is None else [reference.gradient[i]]
         values += [column[i] for column in view.columns.columns.values()]
-        mark = [] if blind is None else ["blind" if blind[i] else ""]
+        mark = [] if blind is None else [view.columns.mark if blind[i] else ""]
         hidden = blind is not None and blind[i]
         table.add_row(Text(view.labels[i]), *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
     return table
