@@ -21,7 +21,7 @@ demo: $(READY) ## install into .venv, then all seven routes on the bar
 	$(BIN)/routes run --problem bar --route all
 
 test: $(READY) ## install into .venv, then the tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(READY) ## style: ruff
 	$(BIN)/ruff check .
@@ -34,6 +34,7 @@ benchmark: $(READY) ## the bar over N and routes into results/, kernels and limi
 	$(BIN)/routes run --problem 'bar[n=8|100|1000|10000|100000|1000000]' --route all
 	$(BIN)/python -m pytest tests/benchmarks/bench_*.py --benchmark-only --benchmark-columns=min,median,iqr,rounds
 	$(BIN)/python -m bench.studies.limits
+	$(BIN)/python -m bench.studies.block_limits
 
 reports: $(READY) ## the tables of everything in results/
 	$(BIN)/routes report

@@ -36,8 +36,8 @@ class Option:
     def text(self) -> str:
         """`name=default`, or `name=a|b` with the default first."""
         if self.choices:
-            others = [c for c in self.choices if c != self.default]
-            return f"{self.name}={'|'.join([str(self.default), *others])}"
+            first = [] if self.default is None else [str(self.default)]
+            return f"{self.name}={'|'.join([*first, *(c for c in self.choices if c not in first)])}"
         return f"{self.name}={'' if self.default is None else self.default}"
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from bench.accuracy import Judges, error, norm2
 from bench.bill import Prices, prices, unaffordable
 from bench.case import ProblemSpec, RouteSpec, point
-from bench.memory import peak_of
+from bench.measure import steady
 from bench.rows import Row, empty_row
-from bench.timing import Samples, rounds, seconds_of
+from bench.timing import Samples, seconds_of
 from problems.errors import RoutesError
 from problems.problem import Array, Offers, ParameterView, Reference
 from routes.model import Model
@@ -26,7 +26,6 @@ from routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
-LONG = 1.0  # [s] calls that take longer are not repeated: one call is timed and its memory read
 
 
 @dataclass(frozen=True)
@@ -182,15 +181,8 @@ class Workbench:
             _note(row, f"{route.name}: counted work differs from the declared")
         self._judge(route, result, row)
         self._note_factors(row)
-        forward = self._forward()
-        if row["first_s"] < LONG:
-            row["peak_bytes"], row["memory_method"] = peak_of(lambda: gradient(self.p))
-            samples = rounds(lambda: gradient(self.p), forward, self.settings.min_time)
-        else:
-            timed: list[float] = []
-            call = lambda: timed.append(seconds_of(lambda: gradient(self.p))[0])  # noqa: E731
-            row["peak_bytes"], row["memory_method"] = peak_of(call)
-            samples = Samples(tuple(timed), (seconds_of(forward)[0],))
+        samples, peak = steady(lambda: gradient(self.p), self._forward(), row["first_s"], self.settings.min_time)
+        row["peak_bytes"], row["memory_method"] = peak
         row |= {
             "seconds": float(np.median(samples.gradient)),
             "seconds_min": min(samples.gradient),

@@ -19,10 +19,11 @@ IDLE = 2  # analyses kept for reuse, a pattern
 
 
 class Factorization(Protocol):
-    """Factors of A. name says of which kind, norm is |A|_inf or a bound of it."""
+    """Factors of A. name says of which kind, norm is |A|_inf or a bound of it, nbytes what they hold."""
 
     name: str
     norm: float
+    nbytes: int
 
     def solve(self, b: Array) -> Array:
         """A^{-1} b, (n_u,)."""
@@ -77,7 +78,7 @@ class ChainFactorization:
             e = int(bad[0])
             raise SingularMatrix(f"{who}: stiffness {K.D[e]:g} of element {e + 1} is not positive - check its modulus")
         self.D = K.D
-        self.norm = K.norm
+        self.norm, self.nbytes = K.norm, K.D.nbytes
 
     def solve(self, b: Array) -> Array:
         forces = cumulative_sum(b[::-1])[::-1]  # B^{-T} b: what hangs behind each element
@@ -100,7 +101,7 @@ class DenseFactorization:
                 self.lu = lu_factor(A)
             except (LinAlgWarning, ValueError) as error:
                 raise SingularMatrix(f"{who}: R_u ({len(A)} x {len(A)}): {error} - check the constraints") from error
-        self.norm = float(np.abs(A).sum(axis=1).max())
+        self.norm, self.nbytes = float(np.abs(A).sum(axis=1).max()), A.nbytes
 
     def solve(self, b: Array) -> Array:
         from scipy.linalg import lu_solve
@@ -126,6 +127,7 @@ class SparseFactorization:
         except RuntimeError as error:
             raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check the constraints") from error
         self.norm = float(abs(A).sum(axis=1).max())
+        self.nbytes = self.lu.nnz * (A.dtype.itemsize + 4)  # entries and their row numbers
 
     def solve(self, b: Array) -> Array:
         return np.asarray(self.lu.solve(b))
@@ -154,6 +156,7 @@ class PardisoFactorization:
             raise SingularMatrix(f"{who}: R_u ({A.pattern.n} unknowns) has no {kind}: {error} - check p") from error
         self.name = f"PARDISO {kind}"
         self.norm = A.norm
+        self.nbytes = 1024 * sum(self.solver.get_iparm_value(i) for i in (15, 16))  # analysis, factors
         weakref.finalize(self, _keep, waiting, self.solver)
 
     def solve(self, b: Array) -> Array:

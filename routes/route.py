@@ -77,7 +77,7 @@ class Route:
     missing: Callable[..., str | None] = nothing_missing
     resolve: Callable[..., Options] = as_given
     expect: Callable[..., Options] = as_given
-    tape: Callable[..., int] | None = None
+    tape: Callable[..., int | None] | None = None
 
     @property
     def summary(self) -> str:

@@ -12,35 +12,55 @@ from problems.problem import Array, Problem
 from routes.model import Model
 from routes.route import Affordable, ForwardWork, Gradient, Offers, Options, Result, Work, route
 
-Inner = Annotated[Literal["cg", "richardson", "jacobi"], "the iteration on the tape"]
+Inner = Annotated[
+    Literal["cg", "richardson", "jacobi", "direct"] | None,
+    "the iteration on the tape; direct: Newton steps with their factors [cg on linear problems, else direct]",
+]
 Iterations = Annotated[int | None, "k [what the forward tolerance needs at p]"]
 KEPT = {"cg": (3, 73), "richardson": (2, 0), "jacobi": (2, 0)}  # per iteration: (n_u,) arrays, bytes of scalars
+TYPICAL = 5  # Newton steps
 NEVER = 10**15  # where an estimate of k ends: no machine iterates longer
 
 
-def cost(n_p: int, forward: ForwardWork, *, inner: str, iterations: int) -> Work:
+def cost(n_p: int, forward: ForwardWork, *, inner: str | None, iterations: int) -> Work:
+    if inner == "direct":
+        k = iterations
+        newton = Work(newton_iterations=k, residuals=k, assemblies=k, factorizations=k, solves=k)
+        return Work(forward_solves=1, residuals=2, transposed_solves=k) + newton
     return Work(forward_solves=1, residuals=2, matvecs=2 * iterations)
 
 
-def check(*, inner: str, iterations: int | None) -> None:
+def check(*, inner: str | None, iterations: int | None) -> None:
     if iterations is not None and iterations < 1:
         raise InputError(f"unrolled-ad: iterations={iterations} - choose at least 1")
 
 
-def missing(problem: Problem, *, inner: str, iterations: int | None) -> str | None:
+def chosen(problem: Problem, inner: str | None) -> str:
+    return inner or ("cg" if problem.linear else "direct")
+
+
+def missing(problem: Problem, *, inner: str | None, iterations: int | None) -> str | None:
+    inner = chosen(problem, inner)
+    if inner == "direct":
+        return None
     if not problem.linear:
-        return f"unrolled-ad[inner={inner}] iterates on linear problems, {problem.name} is nonlinear"
+        return (
+            f"unrolled-ad[inner={inner}] iterates on linear problems, {problem.name} is nonlinear - take inner=direct"
+        )
     if inner == "cg" and problem.structure != "spd":
         return f"unrolled-ad[inner=cg] needs a symmetric positive definite R_u, {problem.name} is {problem.structure}"
-    knows = {"cg": True, "richardson": "spectral_bound", "jacobi": "diagonal"}[inner]
-    if knows is not True and getattr(problem.traced(), str(knows)) is None:
+    knows = {"cg": None, "richardson": "spectral_bound", "jacobi": "diagonal"}[inner]
+    if knows is not None and getattr(problem.traced(), knows) is None:
         return f"unrolled-ad[inner={inner}] needs the {knows} of R_u, which {problem.name} does not offer"
     return None
 
 
-def expect(model: Model, p: Array, *, inner: str, iterations: int | None) -> Options:
+def expect(model: Model, p: Array, *, inner: str | None, iterations: int | None) -> Options:
     """k from the condition number: sqrt(cond) / 2 log(2 / rtol) for CG, cond log(1 / rtol) for the stationary ones."""
-    if iterations is None:
+    inner = chosen(model.problem, inner)
+    if iterations is None and inner == "direct":
+        iterations = 1 if model.problem.linear else TYPICAL
+    elif iterations is None:
         n_u, rtol, condition = model.problem.n_state, model.solver.rtol, model.problem.condition(p)
         condition = n_u**2 if condition is None else condition
         cg = min(n_u, math.sqrt(condition) / 2 * math.log(2 / rtol))
@@ -49,10 +69,18 @@ def expect(model: Model, p: Array, *, inner: str, iterations: int | None) -> Opt
 
 
 def resolve(
-    model: Model, p: Array, affordable: Affordable = lambda options: True, *, inner: str, iterations: int | None
+    model: Model,
+    p: Array,
+    affordable: Affordable = lambda options: True,
+    *,
+    inner: str | None,
+    iterations: int | None,
 ) -> Options:
     """k as counted by iterating until the forward tolerance is met, or until that is no longer affordable."""
-    if iterations is None:
+    inner = chosen(model.problem, inner)
+    if iterations is None and inner == "direct":
+        iterations = model.solve(p).work.newton_iterations
+    elif iterations is None:
         from routes.iterations import iteration
 
         iterate, at_most = iteration(inner, model.traced, model.problem.n_state), 256
@@ -63,8 +91,11 @@ def resolve(
     return {"inner": inner, "iterations": iterations}
 
 
-def tape(problem: Problem, *, inner: str, iterations: int) -> int:
-    vectors, scalars = KEPT[inner]
+def tape(problem: Problem, *, inner: str | None, iterations: int) -> int | None:
+    """None for factors: their fill is not known before."""
+    if inner == "direct":
+        return None
+    vectors, scalars = KEPT[chosen(problem, inner)]
     return iterations * (8 * problem.n_state * vectors + scalars)
 
 
@@ -79,17 +110,24 @@ def tape(problem: Problem, *, inner: str, iterations: int) -> int:
     resolve=resolve,
     tape=tape,
 )
-def unrolled_ad(model: Model, p: Array, *, inner: Inner = "cg", iterations: Iterations = None) -> Gradient:
-    """dJ(u_k(p), p)/dp by backprop through all k iterations (jax.lax.scan): the gradient of the k-th iterate."""
+def unrolled_ad(model: Model, p: Array, *, inner: Inner = None, iterations: Iterations = None) -> Gradient:
+    """dJ(u_k(p), p)/dp by backprop through all k solver iterations: the gradient of the k-th iterate."""
+    assert iterations is not None  # Route.prepare resolves it
+    if inner == "direct":
+        return through_newton(model, iterations)
+    return through_iterations(model, p, str(inner), iterations)
+
+
+def through_iterations(model: Model, p: Array, inner: str, k: int) -> Gradient:
+    """Every linear iteration traced (jax.lax.scan) and compiled."""
     from problems.jax64 import jax
     from routes.differentiable import held_bytes
     from routes.iterations import count_products, iteration
 
-    assert iterations is not None  # Route.prepare resolves it
     iterate = iteration(inner, model.traced, model.problem.n_state)
 
     def objective(p: Any) -> tuple[Any, Any]:
-        u = iterate.iterate(p, iterations)
+        u = iterate.iterate(p, k)
         return model.traced.objective(u, p), u
 
     forward = jax.jit(lambda p: jax.vjp(objective, p, has_aux=True)).trace(p)
@@ -101,13 +139,42 @@ def unrolled_ad(model: Model, p: Array, *, inner: Inner = "cg", iterations: Iter
         J, pullback, u = sweep(p)
         model.tally.count("forward_solves")
         model.tally.count("matvecs", products)
-        residual = model.relative_residual(np.asarray(u), p)
-        dJ_dp = np.asarray(sweep_back(pullback))
-        if np.isfinite(J) and not np.isfinite(dJ_dp).all():
-            raise Overflow(
-                f"unrolled-ad: J = {J:g}, but the backward sweep of {iterations} {inner} iterations overflowed: it"
-                " amplifies rounding where R_u is ill-conditioned - iterate less, or take implicit-ad or adjoint"
-            )
-        return Result(float(J), dJ_dp, np.asarray(u), residual, tape=held_bytes(pullback))
+        return finished(model, p, u, J, sweep_back(pullback), held_bytes(pullback), f"{k} {inner} iterations")
 
     return gradient
+
+
+def through_newton(model: Model, k: int) -> Gradient:
+    """Every Newton step recorded eagerly, its factors kept for its own transposed solve."""
+    from problems.jax64 import jax
+    from routes.differentiable import held_bytes
+    from routes.unrolled_newton import UnrolledNewton
+
+    u_k = UnrolledNewton(model, k)
+    objective = jax.jit(model.traced.objective)
+
+    def gradient(p: Array) -> Result:
+        u_0 = model.problem.initial(p)
+
+        def with_state(p: Any) -> tuple[Any, Any]:
+            u = u_k(u_0, p)
+            return objective(u, p), u
+
+        model.tally.count("forward_solves")
+        J, pullback, u = jax.vjp(with_state, p, has_aux=True)
+        tape = held_bytes(pullback) + u_k.factor_bytes
+        return finished(model, p, u, J, pullback(1.0)[0], tape, f"{k} Newton steps")
+
+    return gradient
+
+
+def finished(model: Model, p: Array, u: Any, J: Any, dJ_dp: Any, tape: int, what: str) -> Result:
+    """The result, its residual measured; raises Overflow where the backward sweep left float64's range."""
+    dJ_dp = np.asarray(dJ_dp)
+    if np.isfinite(J) and not np.isfinite(dJ_dp).all():
+        raise Overflow(
+            f"unrolled-ad: J = {J:g}, but the backward sweep of {what} overflowed: it amplifies rounding where R_u is"
+            " ill-conditioned - iterate less, or take implicit-ad or adjoint"
+        )
+    residual = model.relative_residual(np.asarray(u), p)
+    return Result(float(J), dJ_dp, np.asarray(u), residual, tape=tape)

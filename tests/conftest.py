@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from duffing.problem import Duffing
 
 from bench.cli import main
 from problems.bar import Bar
@@ -26,10 +27,6 @@ from routes.tangent import tangent
 from routes.unrolled_ad import unrolled_ad
 
 ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT / "examples" / "plugin"))  # its problem is a second, nonlinear, member of the zoo
-
-from duffing.problem import Duffing  # noqa: E402
-
 EXACT = (tangent, adjoint, complex_step, implicit_ad)
 ROUTES = (fd_one_sided, fd_central, *EXACT, unrolled_ad)
 EVERY_FACTORS = [{"factors": f} for f in ("refined", "fresh")]
@@ -39,7 +36,7 @@ OPTIONS = {
     "implicit-ad": EVERY_FACTORS,
     "fd-one-sided": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
-    "unrolled-ad": [{"inner": i, "iterations": None} for i in ("cg", "richardson", "jacobi")],
+    "unrolled-ad": [{"inner": i, "iterations": None} for i in ("cg", "richardson", "jacobi", "direct")],
 }
 BARS = {
     "bar[n=1]": {"n": 1},

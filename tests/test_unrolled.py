@@ -7,7 +7,9 @@ import pytest
 from conftest import relative_error, somewhere
 
 from problems.bar import Bar
+from problems.block import Block
 from problems.errors import InputError
+from routes.implicit_ad import implicit_ad
 from routes.iterations import iteration
 from routes.model import Model
 from routes.unrolled_ad import KEPT, unrolled_ad
@@ -83,6 +85,36 @@ def test_the_tape_is_as_large_as_declared(inner: str) -> None:
     declared = unrolled_ad.tape(bar, inner=inner, iterations=20)
     assert tapes[1] - tapes[0] == declared  # bytes of 20 iterations, exactly; the rest does not grow
     assert tapes[0] - declared < 10 * 8 * 500
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_the_newton_loop_gives_the_gradient_of_the_kth_newton_iterate(k: int) -> None:
+    """Equal to a complex step through k Newton steps written here, and not the gradient of the solution."""
+    block = Block(n=2)
+    p = block.parameters.start
+    result = unrolled_ad.prepare(Model(block), p, inner="direct", iterations=k)(p)
+
+    def u_k(q: np.ndarray) -> np.ndarray:
+        u = block.initial(q)
+        for _ in range(k):
+            u = u - np.linalg.solve(block.tangent(u, q).full().toarray(), block.residual(u, q))
+        return u
+
+    h = 1e-30
+    steps = [p + 1j * h * e for e in np.eye(len(p))]
+    exact = np.array([block.objective(u_k(q), q).imag / h for q in steps])
+    assert relative_error(result.gradient, exact) < 1e-11  # cond(R_u) eps of two solvers
+    solution = implicit_ad.prepare(Model(block), p)(p).gradient
+    assert relative_error(result.gradient, solution) > (1e-3, 1e-5, 1e-9)[k - 1]
+
+
+def test_the_tape_of_the_newton_loop_holds_the_factors_of_every_step() -> None:
+    block = Block(n=2)
+    p, model = block.parameters.start, Model(block)
+    tapes = [unrolled_ad.prepare(model, p, inner="direct", iterations=k)(p).tape for k in (2, 4)]
+    factors = model.solve(p).factors.nbytes
+    arrays = 8 * (2 * block.n_state + len(p))  # u, du and p of a step
+    assert tapes[1] - tapes[0] == pytest.approx(2 * (factors + arrays), rel=0.1)  # p is shared, u counted once
 
 
 def test_wrong_iterations_are_wrong_usage() -> None:
