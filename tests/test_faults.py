@@ -7,6 +7,7 @@ import os
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -213,7 +214,7 @@ def test_a_store_that_locks_up_midway_loses_no_printed_row(cli, monkeypatch: pyt
 
 
 def test_a_foreign_store_is_left_alone(tmp_path: Path, cli) -> None:
-    with sqlite3.connect(tmp_path / "foreign.sqlite") as db:
+    with closing(sqlite3.connect(tmp_path / "foreign.sqlite")) as db:
         db.execute("PRAGMA application_id = 77")
     ran = cli("run", "--problem", "bar", "--route", "adjoint", "--store", "foreign.sqlite")
     assert (ran.code, "another program" in ran.err) == (2, True)

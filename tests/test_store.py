@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pandas as pd
@@ -122,8 +123,9 @@ def is_one_line(error: pytest.ExceptionInfo[InputError], says: str) -> bool:
 
 def test_stores_that_are_none_are_refused(tmp_path: Path) -> None:
     (tmp_path / "text").write_text("this is no database, but it is long enough to have a header to look at")
-    with sqlite3.connect(tmp_path / "other") as db:
+    with closing(sqlite3.connect(tmp_path / "other")) as db:
         db.execute("CREATE TABLE songs (title TEXT)")
+        db.commit()
     for path, says in ((tmp_path, "directory"), (tmp_path / "text", "not a database"), (tmp_path / "other", "another")):
         with pytest.raises(InputError) as error:
             Store(path).check_writable()
@@ -136,7 +138,7 @@ def test_stores_that_are_none_are_refused(tmp_path: Path) -> None:
 def test_a_newer_schema_is_refused(tmp_path: Path) -> None:
     store = Store(tmp_path / "s.sqlite")
     store.check_writable()
-    with sqlite3.connect(store.path) as db:
+    with closing(sqlite3.connect(store.path)) as db:
         db.execute(f"PRAGMA user_version = {SCHEMA + 1}")
     for use in (store.check_writable, store.rows):
         with pytest.raises(InputError, match=f"schema {SCHEMA + 1}"):
