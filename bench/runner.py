@@ -25,6 +25,7 @@ from routes.newton import Solver, State
 from routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
+WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
 
 
@@ -229,6 +230,9 @@ class Workbench:
         reference = self.judges.judge(route)
         if reference is not None:
             row["gradient_error"], row["reference"] = error(g, reference)
+            converged = row["residual"] is not None and row["residual"] <= 10.0 * self.settings.solver.rtol
+            if converged and row["gradient_error"] > WRONG:
+                _note(row, f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
 
     def _price(self) -> tuple[Prices, State | None]:
         """Prices and the state they were measured on; a forward solve that fails is not tried again."""

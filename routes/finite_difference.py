@@ -16,7 +16,7 @@ Start = Annotated[
     Literal["cold", "warm", "chord"],
     "perturbed solves from scratch; from the base state; from it and on its factors",
 ]
-StepOption = Annotated[float | None, "h_i / max(|p_i|, s_i)"]
+StepOption = Annotated[float | None, "h_i / max(|p_i|, s_i) [sqrt(eps) one-sided, cbrt(eps) central]"]
 EPS = float(np.finfo(np.float64).eps)
 ONE_SIDED, CENTRAL = EPS ** (1 / 2), EPS ** (1 / 3)  # truncation and round-off balance there
 

@@ -71,7 +71,8 @@ def conjugate_gradients(matvec: Callable[[Any, Any], Any], f: Callable[[Any], An
     """Hestenes & Stiefel 1952. Past convergence it stands still: no 0/0 in the iterate nor in its derivative.
 
     alpha = r.d / d.Kd equals r.r / d.Kd only while rounding leaves r.d = r.r, but minimizes along d always; on
-    ill-conditioned K its reverse sweep loses up to five digits less. Both sweeps amplify rounding there: measure.
+    ill-conditioned K its reverse sweep loses up to five digits less. Both amplify rounding there, without bound: the
+    iterate then converges and its gradient by AD does not (bench warns of it). Measure.
     """
 
     def start(p: Any) -> tuple[Any, ...]:

@@ -169,9 +169,11 @@ def through_newton(model: Model, k: int) -> Gradient:
 
 
 def finished(model: Model, p: Array, u: Any, J: Any, dJ_dp: Any, tape: int, what: str) -> Result:
-    """The result, its residual measured; raises Overflow where the backward sweep left float64's range."""
+    """The result, its residual measured; raises Overflow where a sweep left float64's range."""
     dJ_dp = np.asarray(dJ_dp)
-    if np.isfinite(J) and not np.isfinite(dJ_dp).all():
+    if not np.isfinite(J):
+        raise Overflow(f"unrolled-ad: J = {J:g} after {what}: they diverge from the initial state - take implicit-ad")
+    if not np.isfinite(dJ_dp).all():
         raise Overflow(
             f"unrolled-ad: J = {J:g}, but the backward sweep of {what} overflowed: it amplifies rounding where R_u is"
             " ill-conditioned - iterate less, or take implicit-ad or adjoint"

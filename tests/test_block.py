@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import EXACT, ROOT, relative_error
+from conftest import EXACT, relative_error
 
 from problems.block import Block
 from problems.errors import InputError, NotConverged
@@ -139,5 +139,11 @@ def test_bad_options_of_the_block_are_one_line(options: dict, says: str) -> None
         Block(**options)
 
 
-def test_the_reference_of_the_tests_is_the_shared_one() -> None:
-    assert (ROOT / "tests" / "data" / "block_n4.csv").read_text().startswith("x,y,z,E,dJ_dE\n0.125,0.125,0.125,1.2375,")
+def test_a_converged_state_with_a_wrong_gradient_is_warned_of(cli) -> None:
+    """The reverse sweep of conjugate gradients amplifies rounding: iterates converge, their gradient does not."""
+    command = "run --json --no-store --min-time 0 --problem block[law=linear,n=3] --route unrolled-ad --route adjoint"
+    unrolled, sound = cli(*command.split()).rows
+    assert unrolled["residual"] < 1e-11
+    assert unrolled["gradient_error"] > 1e-2
+    assert "do not use it" in unrolled["note"]
+    assert sound["note"] is None
