@@ -1,172 +1,208 @@
-"""Hyperelastic solids on finite elements: scikit-fem supplies the geometry, the stored energy W everything else.
+"""Finite elements on curved or straight cells, isoparametric: scikit-fem's shape functions, our own metric.
 
-    Pi(u, q) = sum over points of W(I + grad u, q) dx - f.u,     R = dPi/du,     R_u = d^2 Pi/du^2
+    x = sum_a N_a(xi) X_a,     J = dx/dxi,     dN_a/dx = J^-T dN_a/dxi,     n dA = cof(J) n_ref dA_ref  (Nanson)
 
-The energy is written once, in jax.numpy. Routes that trace differentiate Pi; NumPy routes get R from the same Pi and
-R_u from the moduli A = d^2 W/dF^2 at every point, contracted by BLAS: a tenth of the time XLA takes for it.
+Everything is a function of the nodes' positions X, so that a shape may be differentiated; xp is numpy or jax.numpy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from problems.jax64 import jax, jnp
-from problems.materials import Energy
 from problems.problem import Array
-from problems.sparse import SymmetricPattern, SymmetricSparse
 
-CHUNK = 512  # elements contracted at a time: their arrays stay in cache
+ElementName = Literal["hex8", "tet4", "tet10"]
+QUADRATURE = {"hex8": (2, 2), "tet4": (1, 2), "tet10": (2, 4)}  # polynomial orders inside and on facets
+# meshio's name and order of nodes, for cells whose det J is positive and negative in scikit-fem's order
+MESHIO = {
+    "hex8": ("hexahedron", [0, 2, 6, 3, 1, 4, 7, 5], [0, 3, 6, 2, 1, 5, 7, 4]),
+    "tet4": ("tetra", [0, 1, 2, 3], [1, 0, 2, 3]),
+    "tet10": ("tetra10", [0, 1, 2, 3, 4, 5, 6, 7, 8, 9], [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]),
+}
+
+
+def cofactors(J: Any, xp: Any) -> tuple[Any, Any]:
+    """cof(J) = det(J) J^-T and det(J) of matrices (..., 3, 3)."""
+    a, b, c = J[..., 0, :], J[..., 1, :], J[..., 2, :]
+    cof = xp.stack([xp.cross(b, c), xp.cross(c, a), xp.cross(a, b)], axis=-2)
+    return cof, (a * cof[..., 0, :]).sum(-1)
+
+
+@dataclass(frozen=True)
+class Element:
+    """A reference element by name, its shape functions those of scikit-fem."""
+
+    name: ElementName
+
+    @cached_property
+    def basis(self) -> Any:
+        import skfem
+
+        return {"hex8": skfem.ElementHex1, "tet4": skfem.ElementTetP1, "tet10": skfem.ElementTetP2}[self.name]()
+
+    @cached_property
+    def facet_basis(self) -> Any:
+        """Of the first order, on the reference facet: it maps that facet to the element's sides."""
+        import skfem
+
+        return skfem.ElementQuad1() if self.name == "hex8" else skfem.ElementTriP1()
+
+    def shape_functions(self, xi: Array) -> tuple[Array, Array]:
+        """N (..., n_a) and dN/dxi (..., n_a, 3) at reference points xi (3, ...)."""
+        pairs = [self.basis.lbasis(xi, a) for a in range(self.basis.doflocs.shape[0])]
+        N = np.stack([np.broadcast_to(N, xi.shape[1:]) for N, _ in pairs], axis=-1)
+        dN = np.stack([np.stack([np.broadcast_to(d, xi.shape[1:]) for d in dN], axis=-1) for _, dN in pairs], axis=-2)
+        return N, dN
+
+    def quadrature(self, facets: bool = False) -> tuple[Array, Array]:
+        """Reference points (d, n_q) and weights (n_q,) inside the element or on its facets."""
+        from skfem.quadrature import get_quadrature
+
+        domain = self.basis.refdom.brefdom if facets else self.basis.refdom
+        xi, w = get_quadrature(domain, QUADRATURE[self.name][facets])
+        return np.asarray(xi), np.asarray(w)
+
+    def outside(self, xi: Array) -> Array:
+        """How far xi (..., 3) lies outside the reference element (...,); negative inside."""
+        below = -xi.min(axis=-1)
+        return np.maximum(below, xi.max(axis=-1) - 1.0 if self.name == "hex8" else xi.sum(axis=-1) - 1.0)
+
+    def on_side(self, side: int, s: Array) -> tuple[Array, Array]:
+        """Points s (2, n_q) of the reference facet on a side: xi (3, n_q), outward d xi_1 x d xi_2 (n_q, 3)."""
+        domain = self.basis.refdom
+        corners = np.asarray(domain.p)[:, domain.facets[side]]  # (3, corners)
+        pairs = [self.facet_basis.lbasis(s, k) for k in range(corners.shape[1])]
+        xi = sum(np.multiply.outer(v, np.broadcast_to(N, s.shape[1:])) for v, (N, _) in zip(corners.T, pairs, strict=True))
+        along = [
+            sum(np.multiply.outer(np.broadcast_to(dN[i], s.shape[1:]), v) for v, (_, dN) in zip(corners.T, pairs, strict=True))
+            for i in (0, 1)
+        ]
+        normal = np.cross(*along)
+        outward = normal @ (corners.mean(axis=1) - np.asarray(domain.p).mean(axis=1))
+        return np.asarray(xi), normal * np.sign(outward)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """What scikit-fem knows of a mesh, read once.
+    """Cells of one kind: nodes (n_e, n_a) of every cell, positions X (n_nodes, 3) of the nodes [m]."""
 
-    dN (n_e, n_q, n_a, 3)  gradients of the shape functions [1/m]
-    dx (n_e, n_q)          quadrature weights [m^3]
-    nodes (n_e, n_a)       nodes of every element
-    free (n_nodes, 3)      number of the unknown 0..n_u-1, -1 where constrained to zero
+    element: Element
+    nodes: Array
+    X: Array
+
+    @cached_property
+    def _reference(self) -> tuple[Array, Array]:
+        xi, w = self.element.quadrature()
+        return self.element.shape_functions(xi)[1], w  # (n_q, n_a, 3), (n_q,)
+
+    @cached_property
+    def orientation(self) -> Array:
+        """(n_e, 1), the sign of det J: cells may be numbered either way round."""
+        return np.sign(self._volumes(self.X, np)[2][:, :1])
+
+    def _volumes(self, X: Any, xp: Any) -> tuple[Any, Any, Any]:
+        dN_ref, w = self._reference
+        cof, det = cofactors(xp.einsum("eai,qaj->eqij", X[self.nodes], dN_ref), xp)
+        return cof, det, w * det
+
+    def determinants(self) -> Array:
+        """det J (n_e, n_a) at the cells' own nodes."""
+        _, dN = self.element.shape_functions(self.element.basis.doflocs.T)
+        return np.asarray(cofactors(np.einsum("eai,qaj->eqij", self.X[self.nodes], dN), np)[1])
+
+    def at(self, X: Any, xp: Any) -> tuple[Any, Any]:
+        """dN (n_e, n_q, n_a, 3) [1/m] and dx (n_e, n_q) [m^3] for nodes at X."""
+        cof, det, w_det = self._volumes(X, xp)
+        dN = xp.einsum("qaj,eqij->eqai", self._reference[0], cof) / det[..., None, None]
+        return dN, w_det * self.orientation
+
+    @cached_property
+    def metric(self) -> tuple[Array, Array]:
+        """dN, dx of the nodes as they are."""
+        return self.at(self.X, np)
+
+    @cached_property
+    def centres(self) -> Array:
+        """(n_e, 3) [m], the means of the cells' nodes."""
+        return np.asarray(self.X[self.nodes].mean(axis=1))
+
+    def for_meshio(self) -> tuple[str, Array]:
+        """meshio's name of the cells and their nodes (n_e, n_a) in its order, all the right way round."""
+        name, positive, negative = MESHIO[self.element.name]
+        return name, np.where(self.orientation > 0, self.nodes[:, positive], self.nodes[:, negative])
+
+    def locate(self, x: Array) -> tuple[Array, Array, Array]:
+        """The cell (m,) and the reference point (m, 3) of points x (m, 3), and how far outside it lies (m,)."""
+        from scipy.spatial import cKDTree
+
+        k = min(len(self.nodes), 24)
+        cells = cKDTree(self.centres).query(x, k)[1].reshape(len(x), k)
+        X, xi = self.X[self.nodes[cells]], np.full((*cells.shape, 3), 0.25)
+        for _ in range(12):  # Newton's method for x = sum_a N_a(xi) X_a
+            N, dN = self.element.shape_functions(np.moveaxis(xi, -1, 0))
+            r = np.einsum("mka,mkai->mki", N, X) - x[:, None]
+            cof, det = cofactors(np.einsum("mkai,mkaj->mkij", X, dN), np)
+            xi = xi - np.einsum("mkij,mki->mkj", cof, r) / det[..., None]
+            xi = np.clip(xi, -4.0, 5.0)  # far outside, the map may fold
+        outside = self.element.outside(xi)
+        best = outside.argmin(axis=1)
+        at = np.arange(len(x)), best
+        return cells[at], xi[at], outside[at]
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Sides of cells with quadrature points on them.
+
+    cells, sides (n_f,)   the cell each belongs to, and which of its sides it is
+    N (n_f, n_q, n_a)     shape functions of that cell at the points, dN (n_f, n_q, n_a, 3) by reference coordinates
+    n_ref (n_f, n_q, 3)   outward normal of the reference side times its weight
     """
 
+    geometry: Geometry
+    cells: Array
+    sides: Array
+    N: Array
     dN: Array
-    dx: Array
-    nodes: Array
-    free: Array
+    n_ref: Array
 
     @classmethod
-    def of_mesh(cls, mesh: Any, element: Any, intorder: int, free: Array) -> Geometry:
-        """From a scikit-fem mesh and scalar element; `free` numbers the unknowns of every node."""
-        from skfem import Basis
-
-        basis = Basis(mesh, element, intorder=intorder)
-        dN = np.stack([basis.basis[a][0].grad for a in range(basis.Nbfun)])  # (n_a, 3, n_e, n_q)
-        return cls(np.ascontiguousarray(dN.transpose(2, 3, 0, 1)), basis.dx, basis.element_dofs.T, free)
-
-    @property
-    def n_u(self) -> int:
-        return int(self.free.max()) + 1
-
-    @cached_property
-    def unknowns(self) -> Array:
-        """(n_e, 3 n_a), numbers of every element's unknowns, -1 where constrained."""
-        return self.free[self.nodes].reshape(len(self.nodes), -1)
-
-
-class Solid:
-    """Internal energy of a solid with the energy W(F, q); q is a tuple of arrays (n_e,) or numbers."""
-
-    def __init__(self, geometry: Geometry, W: Energy) -> None:
-        self.geometry = geometry
-        self.pattern = SymmetricPattern.of_elements(geometry.unknowns, geometry.n_u)
-        at_points = jax.vmap(W, (0, None))  # over the points of an element, which share q
-        self._energies = jax.vmap(at_points)
-        self._moduli = jax.jit(jax.vmap(jax.vmap(_second_derivative(W), (0, None))))
-        self._dN, self._dx = jnp.asarray(geometry.dN), jnp.asarray(geometry.dx)
-        # constrained displacements are read from one more entry of u, a zero
-        self._gather = jnp.asarray(np.where(geometry.unknowns < 0, geometry.n_u, geometry.unknowns))
-
-    def deformation_gradients(self, u: Any) -> Any:
-        """F = I + grad u at every point, (n_e, n_q, 3, 3); traceable."""
-        n_e, _, n_a, _ = self._dN.shape
-        u_e = jnp.append(u, 0.0)[self._gather].reshape(n_e, n_a, 3)
-        return jnp.einsum("eai,eqaj->eqij", u_e, self._dN) + jnp.eye(3)
-
-    def energy(self, u: Any, q: Any) -> Any:
-        """Sum of W dx; traceable, holomorphic in u and q where W is."""
-        return (self._energies(self.deformation_gradients(u), q) * self._dx).sum()
-
-    @cached_property
-    def moduli(self) -> Callable[[Any, Any], Any]:
-        """(u, q) -> A dx, (n_e, n_q, 3, 3, 3, 3)."""
-        dx = self._dx[..., None, None, None, None]
-        return jax.jit(lambda u, q: self._moduli(self.deformation_gradients(u), q) * dx)
-
-    def tangent(self, u: Array, q: Any) -> SymmetricSparse:
-        """R_u: K_(ai)(bj) = sum over points of dN_a,J A_iJjL dN_b,L dx, assembled."""
-        A = np.asarray(self.moduli(u, q))
-        n_e, n_q, n_a, _ = self.geometry.dN.shape
-        m = 3 * n_a
-        i, j = np.triu_indices(m)
-        upper = np.empty((n_e, len(i)), A.dtype)
-        for first in range(0, n_e, CHUNK):
-            chunk = slice(first, first + CHUNK)
-            B = self._strain_operator(self.geometry.dN[chunk])  # (chunk, n_q, 9, m)
-            AB = A[chunk].reshape(-1, n_q, 9, 9) @ B
-            K = B.reshape(-1, 9 * n_q, m).transpose(0, 2, 1) @ AB.reshape(-1, 9 * n_q, m)
-            np.take(K.reshape(-1, m * m), i * m + j, axis=1, out=upper[chunk])
-        return self.pattern.assemble(upper)
-
-    @staticmethod
-    def _strain_operator(dN: Array) -> Array:
-        """B with grad u = B u_e: (n_e, n_q, 9, 3 n_a)."""
-        n_e, n_q, n_a, _ = dN.shape
-        B = np.zeros((n_e, n_q, 3, 3, n_a, 3))
-        for i in range(3):
-            B[:, :, i, :, :, i] = dN.transpose(0, 1, 3, 2)
-        return B.reshape(n_e, n_q, 9, 3 * n_a)
-
-
-@dataclass(frozen=True)
-class TracedJacobian:
-    """A Jacobian known by its products: forward(v) and reverse(lam), compiled."""
-
-    forward: Callable[[Array], Any]
-    reverse: Callable[[Array], Any]
+    def of(cls, geometry: Geometry, cells: Array, sides: Array) -> Facets:
+        s, w = geometry.element.quadrature(facets=True)
+        N, dN, n_ref = [], [], []
+        for side in sides:
+            xi, normal = geometry.element.on_side(int(side), s)
+            values, derivatives = geometry.element.shape_functions(xi)
+            N.append(values)
+            dN.append(derivatives)
+            n_ref.append(normal * w[:, None])
+        return cls(geometry, cells, sides, np.stack(N), np.stack(dN), np.stack(n_ref))
 
     @property
-    def T(self) -> TracedJacobian:
-        return TracedJacobian(self.reverse, self.forward)
+    def nodes(self) -> Array:
+        """(n_f, n_a), nodes of the cells they belong to."""
+        return np.asarray(self.geometry.nodes[self.cells])
 
-    def __matmul__(self, v: Array) -> Array:
-        return np.asarray(self.forward(v))
+    @cached_property
+    def node_set(self) -> Array:
+        """Numbers of the nodes that lie on them."""
+        return np.unique(self.nodes[(np.abs(self.N) > 1e-9).any(axis=1)])
 
+    def normals(self, x: Any, xp: Any) -> Any:
+        """n dA (n_f, n_q, 3) [m^2], outward, for the nodes (n_f, n_a, 3) of their cells at x, deformed or not."""
+        cof, _ = cofactors(xp.einsum("fai,fqaj->fqij", x, self.dN), xp)
+        orientation = self.geometry.orientation[self.cells][..., None]
+        return xp.einsum("fqij,fqj->fqi", cof, self.n_ref) * orientation
 
-class CompiledResidual:
-    """A traced R = dPi/du - f, f free of p, compiled, with products of its Jacobians for NumPy callers.
+    @cached_property
+    def centres(self) -> Array:
+        """(n_f, 3) [m]."""
+        return np.einsum("fqa,fai->fqi", self.N, self.geometry.X[self.nodes]).mean(axis=1)
 
-    R_u is a Hessian, hence its own transpose, and R_p^T w = d/dp (dPi/du . w): both take half the time of a vjp of R.
-    """
-
-    def __init__(self, R: Callable[[Any, Any], Any], Pi: Callable[[Any, Any], Any]) -> None:
-        self._R = jax.jit(R)
-        self._R_u_v = jax.jit(lambda u, p, v: jax.jvp(lambda u: R(u, p), (u,), (v,))[1])
-        self._R_p_v = jax.jit(lambda u, p, v: jax.jvp(lambda p: R(u, p), (p,), (v,))[1])
-        self._R_p_T_w = jax.jit(jax.grad(lambda u, p, w: jax.jvp(lambda u: Pi(u, p), (u,), (w,))[1], 1))
-
-    def __call__(self, u: Array, p: Array) -> Array:
-        return np.asarray(self._R(u, p))
-
-    def by_u(self, u: Array, p: Array) -> TracedJacobian:
-        return TracedJacobian(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_v(u, p, w))
-
-    def by_p(self, u: Array, p: Array) -> TracedJacobian:
-        return TracedJacobian(lambda v: self._R_p_v(u, p, v), lambda w: self._R_p_T_w(u, p, w))
-
-
-def gradient(f: Callable[..., Any], argument: int) -> Callable[..., Any]:
-    """The derivative of a scalar function by one of its arguments, holomorphic where any of them is complex."""
-
-    def derivative(*arguments: Any) -> Any:
-        complex_ = any(jnp.iscomplexobj(leaf) for leaf in jax.tree.leaves(arguments))
-        if complex_:
-            arguments = jax.tree.map(lambda a: jnp.asarray(a, jnp.complex128), arguments)
-        return jax.grad(f, argument, holomorphic=complex_)(*arguments)
-
-    return derivative
-
-
-def _second_derivative(W: Energy) -> Callable[[Any, Any], Any]:
-    """A(F, q) = d^2 W / dF^2, (3, 3, 3, 3), forward over reverse."""
-
-    def A(F: Any, q: Any) -> Any:
-        P = gradient(W, 0)
-        directions = jnp.eye(9, dtype=F.dtype).reshape(9, 3, 3)
-        columns = jax.vmap(lambda D: jax.jvp(lambda F: P(F, q), (F,), (D,))[1])(directions)  # (9, 3, 3), by jL
-        return jnp.moveaxis(columns.reshape(3, 3, 3, 3), (0, 1), (2, 3))
-
-    return A
+    def areas(self, X: Any, xp: Any) -> Any:
+        """dA (n_f, n_q) [m^2] for nodes at X (n_nodes, 3)."""
+        return xp.sqrt((self.normals(X[self.nodes], xp) ** 2).sum(-1))

@@ -12,10 +12,12 @@ from problems.errors import InputError
 from problems.problem import Array
 
 
-def read_columns(path: str | Path, names: tuple[str, ...] | None) -> dict[str, Array]:
+def read_columns(
+    path: str | Path, names: tuple[str, ...] | None, blank: tuple[str, ...] = ()
+) -> dict[str, Array]:
     """Read the columns `names` (all of them, where None) of a CSV file as finite float64 arrays (n_rows,).
 
-    Raises InputError for a file that cannot be read, a missing column, text, NaN or infinity, naming the line.
+    In the columns `blank` an empty cell is NaN: not measured. Raises InputError for a file that cannot be read, a missing column, text, NaN or infinity, naming the line.
     """
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
@@ -43,7 +45,8 @@ def read_columns(path: str | Path, names: tuple[str, ...] | None) -> dict[str, A
         if len(row) != len(header):
             raise InputError(f"{path}: line {line} has {len(row)} cells, the header {len(header)} - mend the line")
         for place, column, name in places:
-            column[k] = _number(row[place], f"{path}: line {line}, column {name}")
+            empty = name in blank and not row[place].strip()
+            column[k] = math.nan if empty else _number(row[place], f"{path}: line {line}, column {name}")
     return columns
 
 

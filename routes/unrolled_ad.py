@@ -16,56 +16,75 @@ Inner = Annotated[
     Literal["cg", "richardson", "jacobi", "direct"] | None,
     "the iteration on the tape; direct: Newton steps with their factors [cg on linear problems, else direct]",
 ]
-Iterations = Annotated[int | None, "k [what the forward tolerance needs at p]"]
+Iterations = Annotated[int | None, "k, a Newton step's; direct: Newton steps [what the forward tolerance needs at p]"]
+NewtonSteps = Annotated[int | None, "Newton steps around them [1 on linear problems, else as the forward solve]"]
+Checkpoint = Annotated[int | None, "keep every so-manieth iterate on the tape, work out the others again [all]"]
 KEPT = {"cg": (3, 73), "richardson": (2, 0), "jacobi": (2, 0)}  # per iteration: (n_u,) arrays, bytes of scalars
+CARRIED = {"cg": (2, 24), "richardson": (1, 8), "jacobi": (2, 0)}  # the same of a checkpoint
 TYPICAL = 5  # Newton steps
 NEVER = 10**15  # where an estimate of k ends: no machine iterates longer
 
 
-def cost(n_p: int, forward: ForwardWork, *, inner: str | None, iterations: int) -> Work:
+def cost(
+    n_p: int, forward: ForwardWork, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None
+) -> Work:
     if inner == "direct":
         k = iterations
-        newton = Work(newton_iterations=k, residuals=k, assemblies=k, factorizations=k, solves=k)
-        return Work(forward_solves=1, residuals=2, transposed_solves=k) + newton
-    return Work(forward_solves=1, residuals=2, matvecs=2 * iterations)
+        steps = Work(newton_iterations=k, residuals=k, assemblies=k, factorizations=k, solves=k)
+        return Work(forward_solves=1, residuals=2, transposed_solves=k) + steps
+    again = 0 if checkpoint is None else iterations - iterations % checkpoint
+    return Work(forward_solves=1, residuals=2, matvecs=(newton or 1) * (2 * iterations + again))
 
 
-def check(*, inner: str | None, iterations: int | None) -> None:
-    if iterations is not None and iterations < 1:
-        raise InputError(f"unrolled-ad: iterations={iterations} - choose at least 1")
+def check(*, inner: str | None, iterations: int | None, newton: int | None, checkpoint: int | None) -> None:
+    for name, count in (("iterations", iterations), ("newton", newton), ("checkpoint", checkpoint)):
+        if count is not None and count < 1:
+            raise InputError(f"unrolled-ad: {name}={count} - choose at least 1")
+    if inner == "direct" and (newton, checkpoint) != (None, None):
+        raise InputError("unrolled-ad: inner=direct counts its Newton steps by iterations= and keeps them all - give no more")
 
 
 def chosen(problem: Problem, inner: str | None) -> str:
     return inner or ("cg" if problem.linear else "direct")
 
 
-def missing(problem: Problem, *, inner: str | None, iterations: int | None) -> str | None:
+def missing(
+    problem: Problem, *, inner: str | None, iterations: int | None, newton: int | None, checkpoint: int | None
+) -> str | None:
     inner = chosen(problem, inner)
     if inner == "direct":
         return None
-    if not problem.linear:
-        return (
-            f"unrolled-ad[inner={inner}] iterates on linear problems, {problem.name} is nonlinear - take inner=direct"
-        )
     if inner == "cg" and problem.structure != "spd":
         return f"unrolled-ad[inner=cg] needs a symmetric positive definite R_u, {problem.name} is {problem.structure}"
+    if inner != "cg" and not problem.linear:
+        return f"unrolled-ad[inner={inner}] iterates on linear problems, {problem.name} is nonlinear - take inner=cg"
     knows = {"cg": None, "richardson": "spectral_bound", "jacobi": "diagonal"}[inner]
     if knows is not None and getattr(problem.traced(), knows) is None:
         return f"unrolled-ad[inner={inner}] needs the {knows} of R_u, which {problem.name} does not offer"
     return None
 
 
-def expect(model: Model, p: Array, *, inner: str | None, iterations: int | None) -> Options:
+def expect(
+    model: Model,
+    p: Array,
+    *,
+    inner: str | None,
+    iterations: int | None,
+    newton: int | None,
+    checkpoint: int | None,
+) -> Options:
     """k from the condition number: sqrt(cond) / 2 log(2 / rtol) for CG, cond log(1 / rtol) for the stationary ones."""
     inner = chosen(model.problem, inner)
+    steps = 1 if model.problem.linear else TYPICAL
     if iterations is None and inner == "direct":
-        iterations = 1 if model.problem.linear else TYPICAL
+        iterations = steps
     elif iterations is None:
         n_u, rtol, condition = model.problem.n_state, model.solver.rtol, model.problem.condition(p)
         condition = n_u**2 if condition is None else condition
         cg = min(n_u, math.sqrt(condition) / 2 * math.log(2 / rtol))
         iterations = math.ceil(min(NEVER, cg if inner == "cg" else condition * math.log(1 / rtol)))
-    return {"inner": inner, "iterations": iterations}
+    newton = None if inner == "direct" else newton or steps
+    return {"inner": inner, "iterations": iterations, "newton": newton, "checkpoint": checkpoint}
 
 
 def resolve(
@@ -75,28 +94,50 @@ def resolve(
     *,
     inner: str | None,
     iterations: int | None,
+    newton: int | None,
+    checkpoint: int | None,
 ) -> Options:
-    """k as counted by iterating until the forward tolerance is met, or until that is no longer affordable."""
-    inner = chosen(model.problem, inner)
+    """k as counted by iterating until the forward tolerance is met, or until that is no longer affordable.
+
+    On nonlinear problems k is what the systems at both ends of the Newton iteration need.
+    """
+    problem, inner = model.problem, chosen(model.problem, inner)
+    state = None if problem.linear else model.solve(p)
+    steps = 1 if state is None else state.work.newton_iterations
+    options = {"inner": inner, "newton": None if inner == "direct" else newton or steps, "checkpoint": checkpoint}
     if iterations is None and inner == "direct":
-        iterations = model.solve(p).work.newton_iterations
+        iterations = steps
     elif iterations is None:
         from routes.iterations import iteration
 
-        iterate, at_most = iteration(inner, model.traced, model.problem.n_state), 256
-        iterations = iterate.iterations_to(p, model.solver.rtol, at_most)
-        while iterations == at_most and affordable({"inner": inner, "iterations": iterations}):
+        iterate = iteration(inner, model.traced)
+        points = [problem.initial(p)] + ([] if state is None else [near(problem, state.u)])
+        at_most, iterations = 64, 0
+        while True:
             at_most *= 4
-            iterations = iterate.iterations_to(p, model.solver.rtol, at_most)
-    return {"inner": inner, "iterations": iterations}
+            iterations = max(iterate.iterations_to((u, p), model.solver.rtol, at_most) for u in points)
+            if iterations < at_most or not affordable(options | {"iterations": iterations}):
+                break
+    return options | {"iterations": iterations}
 
 
-def tape(problem: Problem, *, inner: str | None, iterations: int) -> int | None:
+def near(problem: Problem, u: Array) -> Array:
+    """A state near u whose residual is no rounding: of the size Newton's last steps correct."""
+    return u * (1.0 + 1e-4 * np.sin(np.arange(len(u))))
+
+
+def tape(problem: Problem, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None) -> int | None:
     """None for factors: their fill is not known before."""
+    inner = chosen(problem, inner)
     if inner == "direct":
         return None
-    vectors, scalars = KEPT[chosen(problem, inner)]
-    return iterations * (8 * problem.n_state * vectors + scalars)
+    vectors, scalars = KEPT[inner]
+    each, kept = 8 * problem.n_state * vectors + scalars, iterations
+    if checkpoint is not None:
+        vectors, scalars = CARRIED[inner]
+        checkpoints, kept = divmod(iterations, checkpoint)
+        return (newton or 1) * (checkpoints * (8 * problem.n_state * vectors + scalars) + kept * each)
+    return (newton or 1) * kept * each
 
 
 @route(
@@ -110,24 +151,36 @@ def tape(problem: Problem, *, inner: str | None, iterations: int) -> int | None:
     resolve=resolve,
     tape=tape,
 )
-def unrolled_ad(model: Model, p: Array, *, inner: Inner = None, iterations: Iterations = None) -> Gradient:
+def unrolled_ad(
+    model: Model,
+    p: Array,
+    *,
+    inner: Inner = None,
+    iterations: Iterations = None,
+    newton: NewtonSteps = None,
+    checkpoint: Checkpoint = None,
+) -> Gradient:
     """dJ(u_k(p), p)/dp by backprop through all k solver iterations: the gradient of the k-th iterate."""
     assert iterations is not None  # Route.prepare resolves it
     if inner == "direct":
         return through_newton(model, iterations)
-    return through_iterations(model, p, str(inner), iterations)
+    assert newton is not None
+    return through_iterations(model, p, str(inner), iterations, newton, checkpoint)
 
 
-def through_iterations(model: Model, p: Array, inner: str, k: int) -> Gradient:
-    """Every linear iteration traced (jax.lax.scan) and compiled."""
+def through_iterations(
+    model: Model, p: Array, inner: str, k: int, newton: int, checkpoint: int | None
+) -> Gradient:
+    """Every linear iteration of every Newton step traced (jax.lax.scan) and compiled."""
     from problems.jax64 import jax
     from routes.differentiable import held_bytes
-    from routes.iterations import count_products, iteration
+    from routes.iterations import count_products, iteration, solution
 
-    iterate = iteration(inner, model.traced, model.problem.n_state)
+    iterate, u_0 = iteration(inner, model.traced), model.problem.initial(p)
+    what = f"{k} {inner} iterations" + (f" in each of {newton} Newton steps" if newton > 1 else "")
 
     def objective(p: Any) -> tuple[Any, Any]:
-        u = iterate.iterate(p, k)
+        u = solution(iterate, u_0, p, newton, k, checkpoint)
         return model.traced.objective(u, p), u
 
     forward = jax.jit(lambda p: jax.vjp(objective, p, has_aux=True)).trace(p)
@@ -139,7 +192,7 @@ def through_iterations(model: Model, p: Array, inner: str, k: int) -> Gradient:
         J, pullback, u = sweep(p)
         model.tally.count("forward_solves")
         model.tally.count("matvecs", products)
-        return finished(model, p, u, J, sweep_back(pullback), held_bytes(pullback), f"{k} {inner} iterations")
+        return finished(model, p, u, J, sweep_back(pullback), held_bytes(pullback), what)
 
     return gradient
 

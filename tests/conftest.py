@@ -36,7 +36,7 @@ OPTIONS = {
     "implicit-ad": EVERY_FACTORS,
     "fd-one-sided": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
-    "unrolled-ad": [{"inner": i, "iterations": None} for i in ("cg", "richardson", "jacobi", "direct")],
+    "unrolled-ad": [unrolled_ad.defaults | {"inner": i} for i in ("cg", "richardson", "jacobi", "direct")],
 }
 BARS = {
     "bar[n=1]": {"n": 1},

@@ -1,0 +1,74 @@
+"""Which displacement components are unknown, which are held at zero, and which a grip moves by an amplitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.bodies import Body
+from problems.errors import InputError
+from problems.problem import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Supports:
+    """Load cases of one body, each with a state of its own; u holds their unknowns one case after the other.
+
+    n_free                         unknowns of a case
+    index (cases, n_nodes, 3)      where a nodal displacement stands in (u_case, 0, a), a the grip's amplitude [m]
+    """
+
+    n_free: int
+    index: Array
+
+    @classmethod
+    def of(cls, body: Body, clamped: Array, gripped: Array, directions: Array) -> Supports:
+        """Nodes held, nodes moved by the grip, and the direction (cases, 3) they are moved in."""
+        X = body.geometry.X
+        free = np.zeros(len(X), dtype=bool)
+        free[np.unique(body.geometry.nodes)] = True  # a file may hold nodes of no cell
+        free[clamped] = free[gripped] = False
+        n_free = 3 * int(free.sum())
+        if n_free == 0:
+            raise InputError(f"{body.who}: no node is free to move - refine the mesh or clamp less")
+        index = np.full((len(X), 3), n_free)
+        index[free] = np.arange(n_free).reshape(-1, 3)
+        cases = np.repeat(index[None], len(directions), axis=0)
+        for case, direction in zip(cases, directions, strict=True):
+            case[gripped[:, None], np.flatnonzero(direction)] = n_free + 1
+        return cls(n_free, cases)
+
+    @property
+    def n_u(self) -> int:
+        return self.n_free * len(self.index)
+
+    def displacements(self, u: Any, a: Any, case: int, nodes: Array, xp: Any) -> Any:
+        """Of the nodes (..., 3) in a load case, from all unknowns u (n_u,)."""
+        u_case = u[case * self.n_free : (case + 1) * self.n_free]
+        return xp.concatenate([u_case, xp.stack([0.0 * a, a])])[self.index[case][nodes]]
+
+    def unknowns(self, nodes: Array, case: int = 0) -> Array:
+        """(n_e, 3 n_a), numbers within a case of the cells' unknowns, -1 where constrained: alike in all cases."""
+        index = self.index[case][nodes].reshape(len(nodes), -1)
+        return np.where(index < self.n_free, index, -1)
+
+    def gather(self, forces: Array, nodes: Array, case: int) -> tuple[Array, Any]:
+        """The transpose of `displacements`: forces (..., 3) summed into (n_free,), and the part that falls to a."""
+        at, n = self.index[case][nodes].ravel(), self.n_free + 2
+        flat = forces.ravel()
+        total = np.bincount(at, weights=flat.real, minlength=n)
+        if np.iscomplexobj(flat):
+            total = total + 1j * np.bincount(at, weights=flat.imag, minlength=n)
+        return total[: self.n_free], total[-1]
+
+
+def check_clamp(body: Body, clamped: Array) -> None:
+    """Raises InputError where rigid motions are left: R_u would be singular."""
+    X = body.geometry.X[clamped]
+    spread = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) if len(X) else np.zeros(3)
+    if (spread > 1e-9 * body.size).sum() < 2:
+        raise InputError(
+            f"{body.who}: {len(clamped)} clamped nodes leave the body free to turn: R_u is singular - clamp a face"
+        )
