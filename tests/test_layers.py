@@ -55,8 +55,8 @@ def test_routes_know_the_contract_of_problems_only() -> None:
 
 def test_heavy_libraries_are_imported_late() -> None:
     """Only the modules about JAX import it on top, and nothing imports those on top."""
-    on_jax = "problems.jax64 problems.elements problems.materials routes.differentiable routes.iterations"
-    traced = {*on_jax.split(), "routes.unrolled_newton"}
+    on_jax = "problems.jax64 problems.elements problems.materials problems.spectral"
+    traced = {*on_jax.split(), "routes.differentiable", "routes.iterations", "routes.unrolled_newton"}
     light = [p for floor in FLOORS for p in modules(floor) if f"{floor}.{p.stem}" not in traced]
     assert len(light) == sum(len(modules(floor)) for floor in FLOORS) - len(traced)
     wrong = {f"{p.name}: {n}" for p in light for n in imports(p, True) if n in traced or n.split(".")[0] in HEAVY}
