@@ -20,7 +20,7 @@ from problems.materials import Energy
 from problems.problem import Array
 from problems.sparse import SymmetricPattern, SymmetricSparse
 
-CHUNK = 512  # elements contracted at a time: their arrays stay in cache
+CHUNK = 128  # elements contracted at a time: their arrays stay in cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +31,14 @@ class Geometry:
     dx (n_e, n_q)          quadrature weights [m^3]
     nodes (n_e, n_a)       nodes of every element
     free (n_nodes, 3)      number of the unknown 0..n_u-1, -1 where constrained to zero
+    rigid (n_u, 6)         rigid motions of the unknowns, if known
     """
 
     dN: Array
     dx: Array
     nodes: Array
     free: Array
+    rigid: Array | None = None
 
     @classmethod
     def of_mesh(cls, mesh: Any, element: Any, intorder: int, free: Array) -> Geometry:
@@ -45,7 +47,8 @@ class Geometry:
 
         basis = Basis(mesh, element, intorder=intorder)
         dN = np.stack([basis.basis[a][0].grad for a in range(basis.Nbfun)])  # (n_a, 3, n_e, n_q)
-        return cls(np.ascontiguousarray(dN.transpose(2, 3, 0, 1)), basis.dx, basis.element_dofs.T, free)
+        rigid = rigid_motions(basis.doflocs, free)
+        return cls(np.ascontiguousarray(dN.transpose(2, 3, 0, 1)), basis.dx, basis.element_dofs.T, free, rigid)
 
     @property
     def n_u(self) -> int:
@@ -57,12 +60,21 @@ class Geometry:
         return self.free[self.nodes].reshape(len(self.nodes), -1)
 
 
+def rigid_motions(x: Array, free: Array) -> Array:
+    """(n_u, 6): translations along and rotations about the three axes of the nodes x (3, n_nodes), linearized."""
+    e, r = np.eye(3), x - x.mean(axis=1, keepdims=True)
+    motions = [np.broadcast_to(e[i], r.T.shape) for i in range(3)] + [np.cross(e[i], r.T) for i in range(3)]
+    rigid = np.empty((int(free.max()) + 1, 6))
+    rigid[free[free >= 0]] = np.stack(motions, axis=-1)[free >= 0]
+    return rigid
+
+
 class Solid:
     """Internal energy of a solid with the energy W(F, q); q is a tuple of arrays (n_e,) or numbers."""
 
     def __init__(self, geometry: Geometry, W: Energy) -> None:
         self.geometry = geometry
-        self.pattern = SymmetricPattern.of_elements(geometry.unknowns, geometry.n_u)
+        self.pattern = SymmetricPattern.of_elements(geometry.unknowns, geometry.n_u, geometry.rigid)
         at_points = jax.vmap(W, (0, None))  # over the points of an element, which share q
         self._energies = jax.vmap(at_points)
         self._moduli = jax.jit(jax.vmap(jax.vmap(_second_derivative(W), (0, None))))
@@ -82,33 +94,29 @@ class Solid:
 
     @cached_property
     def moduli(self) -> Callable[[Any, Any], Any]:
-        """(u, q) -> A dx, (n_e, n_q, 3, 3, 3, 3)."""
+        """(u, q) -> A_iJjL dx, (n_e, n_q, 3, 3, 3, 3) in the order J i j L."""
         dx = self._dx[..., None, None, None, None]
-        return jax.jit(lambda u, q: self._moduli(self.deformation_gradients(u), q) * dx)
+        return jax.jit(lambda u, q: jnp.swapaxes(self._moduli(self.deformation_gradients(u), q) * dx, 2, 3))
 
     def tangent(self, u: Array, q: Any) -> SymmetricSparse:
         """R_u: K_(ai)(bj) = sum over points of dN_a,J A_iJjL dN_b,L dx, assembled."""
-        A = np.asarray(self.moduli(u, q))
-        n_e, n_q, n_a, _ = self.geometry.dN.shape
-        m = 3 * n_a
-        i, j = np.triu_indices(m)
-        upper = np.empty((n_e, len(i)), A.dtype)
+        A, dN = np.asarray(self.moduli(u, q)), self.geometry.dN
+        n_e, n_q, n_a, _ = dN.shape
+        upper = np.empty((n_e, len(self._upper)), A.dtype)
         for first in range(0, n_e, CHUNK):
             chunk = slice(first, first + CHUNK)
-            B = self._strain_operator(self.geometry.dN[chunk])  # (chunk, n_q, 9, m)
-            AB = A[chunk].reshape(-1, n_q, 9, 9) @ B
-            K = B.reshape(-1, 9 * n_q, m).transpose(0, 2, 1) @ AB.reshape(-1, 9 * n_q, m)
-            np.take(K.reshape(-1, m * m), i * m + j, axis=1, out=upper[chunk])
+            G = np.ascontiguousarray(dN[chunk].transpose(0, 1, 3, 2))  # (chunk, n_q, 3, n_a)
+            AG = A[chunk].reshape(-1, n_q, 27, 3) @ G  # (chunk, n_q, J i j, b)
+            K = G.reshape(-1, 3 * n_q, n_a).transpose(0, 2, 1) @ AG.reshape(-1, 3 * n_q, 9 * n_a)  # (chunk, a, i j b)
+            np.take(K.reshape(-1, 9 * n_a * n_a), self._upper, axis=1, out=upper[chunk])
         return self.pattern.assemble(upper)
 
-    @staticmethod
-    def _strain_operator(dN: Array) -> Array:
-        """B with grad u = B u_e: (n_e, n_q, 9, 3 n_a)."""
-        n_e, n_q, n_a, _ = dN.shape
-        B = np.zeros((n_e, n_q, 3, 3, n_a, 3))
-        for i in range(3):
-            B[:, :, i, :, :, i] = dN.transpose(0, 1, 3, 2)
-        return B.reshape(n_e, n_q, 9, 3 * n_a)
+    @cached_property
+    def _upper(self) -> Array:
+        """Where in a i j b the upper triangle of an element matrix (ai)(bj) stands, row by row."""
+        n_a = self.geometry.dN.shape[2]
+        row, column = np.triu_indices(3 * n_a)
+        return np.asarray((3 * row + column % 3) * n_a + column // 3)
 
 
 @dataclass(frozen=True)
