@@ -10,8 +10,9 @@ from typing import Any
 from bench.memory import available_bytes
 from bench.timing import seconds_of
 from problems.problem import Array, Offers
+from routes.forward_work import ForwardWork
 from routes.model import Model
-from routes.newton import ForwardWork, State
+from routes.newton import State
 from routes.tally import Work
 
 SHORT, LONG = 1.0, 10.0  # [s] the first call of anything is slow (compilation): 3 more are timed, 1 more, or none
@@ -28,8 +29,10 @@ class Prices:
 
     def seconds(self, work: Work) -> float:
         """The bill; substitutions inside forward solves are already in their price."""
-        substitutions = work.solves + work.transposed_solves - work.newton_iterations
-        return work.forward_solves * self.forward + substitutions * self.solve + work.matvecs * self.matvec
+        inside = work.forward_solves * self.declared.cold.matvecs  # products of inexact steps, a substitution each
+        products = max(0, work.matvecs - inside)
+        substitutions = work.solves + work.transposed_solves - work.newton_iterations - (work.matvecs - products)
+        return work.forward_solves * self.forward + substitutions * self.solve + products * self.matvec
 
 
 def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
@@ -40,7 +43,9 @@ def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
         return Prices(seconds, 0.0, 0.0, ForwardWork(Work(forward_solves=1))), None
     forward, state = price_of(lambda: model.solve(p))
     R_u = model.tangent_operator(state)
-    declared = ForwardWork(state.work, problem.linear, model.solver.rtol, matrix_free=problem.matrix_free)
+    declared = ForwardWork(
+        state.work, problem.linear, model.solver.rtol, matrix_free=problem.matrix_free, inexact=model.inexact
+    )
     solve, _ = price_of(lambda: state.factors.solve(state.u))
     matvec, _ = price_of(lambda: R_u @ state.u)
     return Prices(forward, solve, matvec, declared), state

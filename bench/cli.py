@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from bench.rows import Row
     from bench.runner import Outcome, View
     from routes.factorization import LinearSolver
+    from routes.newton import Newton
 
 WRONG_USAGE, INTERRUPTED = 2, 130
 STORE = Path("results") / "routes.sqlite"
@@ -107,6 +108,8 @@ def list_(what: str | None) -> None:
 
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
+LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg"]
+NEWTON = "Factors at every Newton step, or kept and iterated with."
 BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 
 
@@ -118,7 +121,8 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 @click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
 @click.option("--rtol", type=float, default=1e-12, show_default=True, help="Forward solve: |R| relative to its start.")
 @click.option("--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most.")
-@click.option("--linear-solver", type=click.Choice(["auto", "pardiso", "superlu"]), default="auto", show_default=True)
+@click.option("--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True)
+@click.option("--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON)
 @click.option("--gradient", is_flag=True, help="Show the gradient parameter by parameter beside its reference.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
 @store_option
@@ -133,6 +137,7 @@ def run(
     rtol: float,
     max_steps: int,
     linear_solver: LinearSolver,
+    newton: Newton,
     gradient: bool,
     as_json: bool,
     store: Path,
@@ -159,7 +164,7 @@ def run(
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
-    solver = Solver(rtol, max_steps, linear_solver)
+    solver = Solver(rtol, max_steps, linear_solver, newton)
     outcomes = run_cases(problem_specs, route_specs, Settings(at, budget, min_time, gradient, solver))
     kept = None if no_store else Store(store)
     if kept is not None:

@@ -264,8 +264,11 @@ class Block(Problem):
 
     @cached_property
     def pattern(self) -> SymmetricPattern | GeneralPattern:
-        of = GeneralPattern if self.structure == "general" else SymmetricPattern
-        return of.of_elements(self.supports.unknowns(self.body.geometry.nodes), self.supports.n_free)
+        geometry, n = self.body.geometry, self.supports.n_free
+        unknowns = self.supports.unknowns(geometry.nodes)
+        if self.structure == "general":
+            return GeneralPattern.of_elements(unknowns, n)
+        return SymmetricPattern.of_elements(unknowns, n, self.supports.rigid_motions(geometry.X))
 
     @cached_property
     def _pick(self) -> Array:

@@ -43,7 +43,8 @@ class HandSolid:
         from problems.solid import contract
 
         F = self._F(u_e, dN)
-        return contract(self.hand.A(F, _per_point(q, F)) * dx[..., None, None, None, None], dN, pick)
+        A = self.hand.A(F, _per_point(q, F)) * dx[..., None, None, None, None]
+        return contract(A.swapaxes(2, 3), dN, pick)
 
     def by_p(self, u: Array, p: Array) -> Any:
         """R_p (n_u, n_p), a sparse matrix: every cell depends on one parameter through each constant."""

@@ -18,7 +18,7 @@ from problems.jax64 import jax, jnp
 from problems.materials import Energy
 from problems.problem import Array
 
-CHUNK = 512  # elements contracted at a time: their arrays stay in cache
+CHUNK = 128  # elements contracted at a time: their arrays stay in cache
 
 
 class Solid:
@@ -39,8 +39,9 @@ class Solid:
         return (self._W(deformation_gradients(u_e, dN), _per_cell(q, dx)) * dx).sum()
 
     def _moduli(self, u_e: Any, q: Any, dN: Any, dx: Any) -> Any:
-        """A dx, (n_e, n_q, 3, 3, 3, 3)."""
-        return self._A(deformation_gradients(u_e, dN), _per_cell(q, dx)) * dx[..., None, None, None, None]
+        """A_iJjL dx, (n_e, n_q, 3, 3, 3, 3) in the order J i j L."""
+        A = self._A(deformation_gradients(u_e, dN), _per_cell(q, dx))
+        return jnp.swapaxes(A * dx[..., None, None, None, None], 2, 3)
 
     def tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, pick: Array) -> Array:
         """Entries `pick` of the element matrices K_(ai)(bj) = sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k)."""
@@ -58,26 +59,21 @@ def _per_cell(q: Any, dx: Any) -> Any:
 
 
 def contract(A_dx: Array, dN: Array, pick: Array) -> Array:
-    """Entries `pick` (k,), counted row by row, of sum over points of B^T A B dx (n_e, 3 n_a, 3 n_a): (n_e, k)."""
+    """Entries `pick` (k,), counted row by row, of the matrices sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k).
+
+    A_dx (n_e, n_q, 3, 3, 3, 3) stands in the order J i j L: two matrix products then do it without transposing.
+    """
     n_e, n_q, n_a, _ = dN.shape
-    m = 3 * n_a
+    row, column = np.divmod(pick, 3 * n_a)
+    at = (3 * row + column % 3) * n_a + column // 3  # where (ai)(bj) stands in a i j b
     entries = np.empty((n_e, len(pick)), np.result_type(A_dx, dN))
     for first in range(0, n_e, CHUNK):
         chunk = slice(first, first + CHUNK)
-        B = _strain_operator(dN[chunk])  # (chunk, n_q, 9, m)
-        AB = A_dx[chunk].reshape(-1, n_q, 9, 9) @ B
-        K = B.reshape(-1, 9 * n_q, m).transpose(0, 2, 1) @ AB.reshape(-1, 9 * n_q, m)
-        np.take(K.reshape(-1, m * m), pick, axis=1, out=entries[chunk])
+        G = np.ascontiguousarray(dN[chunk].transpose(0, 1, 3, 2))  # (chunk, n_q, 3, n_a)
+        AG = A_dx[chunk].reshape(-1, n_q, 27, 3) @ G  # (chunk, n_q, J i j, b)
+        K = G.reshape(-1, 3 * n_q, n_a).transpose(0, 2, 1) @ AG.reshape(-1, 3 * n_q, 9 * n_a)  # (chunk, a, i j b)
+        np.take(K.reshape(-1, 9 * n_a * n_a), at, axis=1, out=entries[chunk])
     return entries
-
-
-def _strain_operator(dN: Array) -> Array:
-    """B with grad u = B u_e: (n_e, n_q, 9, 3 n_a)."""
-    n_e, n_q, n_a, _ = dN.shape
-    B = np.zeros((n_e, n_q, 3, 3, n_a, 3), dN.dtype)
-    for i in range(3):
-        B[:, :, i, :, :, i] = dN.transpose(0, 1, 3, 2)
-    return B.reshape(n_e, n_q, 9, 3 * n_a)
 
 
 @dataclass(frozen=True)

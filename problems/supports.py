@@ -54,6 +54,15 @@ class Supports:
         index = self.index[case][nodes].reshape(len(nodes), -1)
         return np.where(index < self.n_free, index, -1)
 
+    def rigid_motions(self, X: Array) -> Array:
+        """(n_free, 6), translations along and linearized rotations about the three axes, of the nodes at X."""
+        e, r = np.eye(3), X - X.mean(axis=0)
+        motions = [np.broadcast_to(e[i], r.shape) for i in range(3)] + [np.cross(e[i], r) for i in range(3)]
+        free = self.index[0] < self.n_free
+        rigid = np.empty((self.n_free, 6))
+        rigid[self.index[0][free]] = np.stack(motions, axis=-1)[free]
+        return rigid
+
     def gather(self, forces: Array, nodes: Array, case: int) -> tuple[Array, Any]:
         """The transpose of `displacements`: forces (..., 3) summed into (n_free,), and the part that falls to a."""
         at, n = self.index[case][nodes].ravel(), self.n_free + 2

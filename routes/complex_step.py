@@ -16,7 +16,7 @@ POLISH = 1  # the imaginary part, a derivative, converges one Newton step behind
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
-    return forward.solves(n_p, polish=POLISH)
+    return forward.full(n_p, polish=POLISH)
 
 
 @route("complex-step", needs=Offers.SOLVE | Offers.COMPLEX, cost=cost)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import warnings
 import weakref
+from collections.abc import Callable
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -12,10 +13,20 @@ import numpy as np
 from problems.chain import Chain, cumulative_sum
 from problems.errors import InputError, SingularMatrix
 from problems.problem import Array
-from problems.sparse import SymmetricSparse
+from problems.sparse import BlockDiagonal, GeneralSparse, SymmetricSparse
+from routes.pardiso import (
+    COMPLEX_GENERAL,
+    COMPLEX_SYMMETRIC,
+    GENERAL,
+    POSITIVE_DEFINITE,
+    REGULAR,
+    SYMMETRIC,
+    Idle,
+    PardisoFactorization,
+    solution_error,
+)
 
-LinearSolver = Literal["auto", "pardiso", "superlu"]
-IDLE = 2  # analyses kept for reuse, a pattern
+LinearSolver = Literal["auto", "pardiso", "superlu", "cg-amg"]
 
 
 class Factorization(Protocol):
@@ -23,7 +34,9 @@ class Factorization(Protocol):
 
     name: str
     norm: float
-    nbytes: int
+
+    @property
+    def nbytes(self) -> int: ...
 
     def solve(self, b: Array) -> Array:
         """A^{-1} b, (n_u,)."""
@@ -35,7 +48,7 @@ class Factorization(Protocol):
 
 
 class Factorizer:
-    """Makes factorizations; sparse symmetric ones by MKL PARDISO where it is installed, else by SuperLU.
+    """Makes factorizations; sparse ones by MKL PARDISO where it is installed, else by SuperLU, or by multigrid.
 
     A pattern is analyzed once: factors that nobody holds any more leave their analysis to the next ones.
     """
@@ -45,26 +58,42 @@ class Factorizer:
         if linear_solver == "pardiso" and not have_pardiso:
             raise InputError("linear solver pardiso: py-mkl-pardiso is not installed - pip install it or take superlu")
         self.pardiso = have_pardiso and linear_solver != "superlu"
-        self._idle: weakref.WeakKeyDictionary[Any, dict[int, list[Any]]] = weakref.WeakKeyDictionary()
+        self.multigrid = linear_solver == "cg-amg"
+        self._idle: weakref.WeakKeyDictionary[Any, Idle] = weakref.WeakKeyDictionary()
 
     def __call__(self, A: Any, who: str) -> Factorization:
-        """Factorize A: a Chain, a SymmetricSparse, a dense array or a SciPy sparse matrix. Raises SingularMatrix."""
+        """Factorize A: a Chain, a SymmetricSparse or GeneralSparse, BlockDiagonal of such, a dense array or a SciPy
+        sparse matrix. Raises SingularMatrix, and InputError for what cg-amg cannot solve."""
         if isinstance(A, Chain):
             return ChainFactorization(A, who)
-        if isinstance(A, SymmetricSparse):
-            return self._symmetric(A, who) if self.pardiso else SparseFactorization(A.full(), who)
         if isinstance(A, np.ndarray):
             return DenseFactorization(A, who)
-        return SparseFactorization(A, who)
+        if isinstance(A, BlockDiagonal):
+            return BlockFactorization(A, lambda block: self(block, who))
+        if self.multigrid:
+            return self._by_multigrid(A, who)
+        if not isinstance(A, SymmetricSparse | GeneralSparse):
+            return SparseFactorization(A, who)
+        return self._by_pardiso(A, who) if self.pardiso else SparseFactorization(A.full(), who)
 
-    def _symmetric(self, A: SymmetricSparse, who: str) -> Factorization:
-        idle = self._idle.setdefault(A.pattern, {})
-        if np.iscomplexobj(A.data):
-            return PardisoFactorization(A, who, "complex L D L^T", COMPLEX_SYMMETRIC, idle)
+    def _by_multigrid(self, A: Any, who: str) -> Factorization:
+        from routes.multigrid import MultigridFactorization
+
+        if not isinstance(A, SymmetricSparse) or np.iscomplexobj(A.data):
+            kind = "complex" if isinstance(A, SymmetricSparse) else "not known to be symmetric"
+            raise InputError(f"{who}: cg-amg solves real symmetric systems, R_u is {kind} - take pardiso or superlu")
+        return MultigridFactorization(A, who)
+
+    def _by_pardiso(self, A: SymmetricSparse | GeneralSparse, who: str) -> Factorization:
+        idle, complex_ = self._idle.setdefault(A.pattern, {}), np.iscomplexobj(A.data)
+        if isinstance(A, GeneralSparse):
+            return PardisoFactorization(A, who, COMPLEX_GENERAL if complex_ else GENERAL, idle)
+        if complex_:
+            return PardisoFactorization(A, who, COMPLEX_SYMMETRIC, idle)
         try:
-            return PardisoFactorization(A, who, "L L^T", POSITIVE_DEFINITE, idle)
+            return PardisoFactorization(A, who, POSITIVE_DEFINITE, idle)
         except SingularMatrix:  # not positive definite: a buckled state, say
-            return PardisoFactorization(A, who, "L D L^T", SYMMETRIC, idle)
+            return PardisoFactorization(A, who, SYMMETRIC, idle)
 
 
 class ChainFactorization:
@@ -126,7 +155,14 @@ class SparseFactorization:
             self.lu: Any = splu(A.tocsc())
         except RuntimeError as error:
             raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check the constraints") from error
+
         self.norm = float(abs(A).sum(axis=1).max())
+        missed = solution_error(A, self.solve)
+        if not missed < REGULAR:
+            raise SingularMatrix(
+                f"{who}: R_u ({A.shape[0]} unknowns) is singular: a known solution is missed by {missed:.2g}"
+                " - check p and the supports"
+            )
         self.nbytes = self.lu.nnz * (A.dtype.itemsize + 4)  # entries and their row numbers
 
     def solve(self, b: Array) -> Array:
@@ -136,39 +172,21 @@ class SparseFactorization:
         return np.asarray(self.lu.solve(b, "T"))
 
 
-POSITIVE_DEFINITE, SYMMETRIC, COMPLEX_SYMMETRIC = 2, -2, 6  # PARDISO's matrix types
+class BlockFactorization:
+    """Factors of diag(A_1, ..., A_c), one factorization a block."""
 
-
-class PardisoFactorization:
-    """Sparse factors of a symmetric matrix by MKL PARDISO; not Hermitian where complex."""
-
-    def __init__(self, A: SymmetricSparse, who: str, kind: str, mtype: int, idle: dict[int, list[Any]]) -> None:
-        from pymklpardiso import PardisoSolver
-
-        waiting = idle.setdefault(mtype, [])
-        try:
-            if waiting:
-                self.solver = waiting.pop()
-                self.solver.refactor(A.data)
-            else:
-                self.solver = PardisoSolver(A.upper, mtype)
-        except RuntimeError as error:
-            raise SingularMatrix(f"{who}: R_u ({A.pattern.n} unknowns) has no {kind}: {error} - check p") from error
-        self.name = f"PARDISO {kind}"
-        self.norm = A.norm
-        self.nbytes = 1024 * sum(self.solver.get_iparm_value(i) for i in (15, 16))  # analysis, factors
-        weakref.finalize(self, _keep, waiting, self.solver)
-
-    def solve(self, b: Array) -> Array:
-        return np.asarray(self.solver.solve(np.ascontiguousarray(b, dtype=self._dtype)))
-
-    solve_transposed = solve
+    def __init__(self, A: BlockDiagonal, factorize: Callable[[Any], Factorization]) -> None:
+        self._split = A.split
+        self.blocks = tuple(factorize(block) for block in A.blocks)
+        self.name = " + ".join(dict.fromkeys(block.name for block in self.blocks))
+        self.norm = max(block.norm for block in self.blocks)
 
     @property
-    def _dtype(self) -> Any:
-        return np.complex128 if self.solver.mtype == COMPLEX_SYMMETRIC else np.float64
+    def nbytes(self) -> int:
+        return sum(block.nbytes for block in self.blocks)
 
+    def solve(self, b: Array) -> Array:
+        return np.concatenate([f.solve(part) for f, part in zip(self.blocks, self._split(b), strict=True)])
 
-def _keep(waiting: list[Any], solver: Any) -> None:
-    if len(waiting) < IDLE:
-        waiting.append(solver)
+    def solve_transposed(self, b: Array) -> Array:
+        return np.concatenate([f.solve_transposed(part) for f, part in zip(self.blocks, self._split(b), strict=True)])

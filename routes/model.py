@@ -10,6 +10,7 @@ import numpy as np
 from problems.errors import NotConverged, SingularMatrix
 from problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
 from routes.continuation import by_load_steps
+from routes.directions import Chord, Direction, Doorways, Full, Inexact
 from routes.factorization import Factorization, Factorizer
 from routes.newton import Solver, State, Step, newton, norm
 from routes.tally import Tally
@@ -96,15 +97,40 @@ class Model:
         u = self.problem.initial(p) if start is None else start.u.astype(p.dtype)
         scale = None if start is None else start.scale
         try:
-            u, history, scale, last = self._newton(u, p, scale, factors, polish=polish)
+            steps = self._direction(p, start, factors)
+            u, history, scale = self._newton(u, p, scale, steps, polish=polish)
         except (NotConverged, SingularMatrix):
             load = self.problem.load(p) if start is None else None
             if load is None:
                 raise
-            u = by_load_steps(lambda t, u: self._newton(u, p, norm(load), None, (1.0 - t) * load)[0], u, self._who)
-            u, history, scale, last = self._newton(u, p, norm(load), None, polish=polish)
+            steps = self._direction(p)
+            u = by_load_steps(lambda t, u: self._newton(u, p, norm(load), steps, (1.0 - t) * load)[0], u, self._who)
+            u, history, scale = self._newton(u, p, norm(load), steps, polish=polish)
+        assert steps.factors is not None  # at least one step was taken
         J = self.problem.objective(u, p)
-        return State(p, u, J, history, scale, last, self.tally.work - before)
+        return State(p, u, J, history, scale, steps.factors, self.tally.work - before, steps.rate)
+
+    @property
+    def inexact(self) -> bool:
+        """Whether real states are solved for by inexact steps."""
+        return self.solver.newton == "inexact" and not self.problem.linear
+
+    def _direction(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> Direction:
+        problem = self.problem
+        doorways = Doorways(
+            assemble=lambda u: self.tangent(u, p),
+            factorize=self.factorize,
+            operator=(lambda u: problem.tangent_operator(u, p)) if problem.matrix_free else None,
+            substitute=self.solve_linear,
+            product=self.matvec,
+            step=lambda: self.tally.count("newton_iterations"),
+            symmetric=problem.structure != "general",
+        )
+        if factors is not None:
+            return Chord(doorways, factors)
+        if self.inexact and not np.iscomplexobj(p):
+            return Inexact(doorways, None if start is None else start.factors)
+        return Full(doorways)
 
     @property
     def _who(self) -> str:
@@ -115,18 +141,13 @@ class Model:
         u: Array,
         p: Array,
         scale: float | None,
-        factors: Factorization | None,
+        direction: Direction,
         unloading: Any = 0.0,
         polish: int = 0,
-    ) -> tuple[Array, tuple[float, ...], float, Factorization]:
+    ) -> tuple[Array, tuple[float, ...], float]:
         """Newton's method on R + unloading, from u."""
-        step = Step(
-            offset=self.problem.offset,
-            residual=lambda u: self.residual(u, p) + unloading,
-            factorize=lambda u: self.factorize(self.tangent(u, p)),
-            correct=self.newton_correction,
-        )
-        return newton(step, u, self.solver, self._who, scale, factors, polish)
+        step = Step(self.problem.offset, lambda u: self.residual(u, p) + unloading, direction)
+        return newton(step, u, self.solver, self._who, scale, polish)
 
     def relative_residual(self, u: Array, p: Array) -> float:
         """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that was not solved for here: two residuals."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
 
 from problems.errors import NotConverged
 from problems.problem import Array
+from routes.factorization import Factorization
+from routes.krylov import conjugate_gradients, conjugate_residuals, products_to
 from routes.model import Model
 from routes.newton import State, norm
 from routes.route import ForwardWork, Work
@@ -18,53 +22,62 @@ Factors = Annotated[
 ]
 RTOL = 1e-12  # |b - R_u x|_inf / |b|_inf of a refined solve
 SAFETY = 10.0  # on the contraction seen, before it is trusted once more
+WORTH = 15  # products, each with a substitution, that cost what an assembly and a factorization cost
 
 
 class LinearizedSolver:
-    """R_u^{-1} and R_u^{-T} at a solved state.
+    """R_u^{-1} and R_u^{-T} at a solved state, for about `solves` right-hand sides.
 
     The last Newton factors belong to the iterate before: used as they are (`stale`), the gradient is off by the
-    size of the last step. `refined` corrects with them, x <- x + A^{-1} (b - R_u x), which converges by that same
-    factor a sweep; where it does not, and for `fresh`, R_u is factorized at u. A linear problem's factors fit.
+    size of the last step. `refined` corrects with them by Krylov iterations on products with R_u; where those would
+    take longer than new factors, as after inexact steps, and for `fresh`, R_u is factorized at u. A linear problem's
+    factors fit.
     """
 
-    def __init__(self, model: Model, state: State, factors: str) -> None:
-        self.model, self.state, self.factors = model, state, factors
-        exact = model.problem.linear or factors == "stale"
-        self.R_u = None if exact or factors == "fresh" else model.tangent_operator(state)
-        self.A = model.factors_at(state) if factors == "fresh" and not exact else state.factors
+    def __init__(self, model: Model, state: State, factors: str, solves: int = 1) -> None:
+        self.model, self.state = model, state
+        self.A, self.R_u = state.factors, None
+        if model.problem.linear or factors == "stale":
+            return
+        known = state.rate is not None and math.isfinite(state.rate)
+        if factors == "fresh" or (known and solves * products_to(state.rate or 0.0, 1.0, RTOL) > WORTH):
+            self.A = model.factors_at(state)
+        else:
+            self.R_u = model.tangent_operator(state)
 
     def solve(self, b: Array) -> Array:
         """x with R_u x = b."""
-        return self._solve(b, transposed=False)
+        return self._solve(b, self.model.solve_linear, transposed=False)
 
     def solve_transposed(self, b: Array) -> Array:
         """x with R_u^T x = b."""
-        return self._solve(b, transposed=True)
+        return self._solve(b, self.model.solve_transposed, transposed=True)
 
-    def _solve(self, b: Array, transposed: bool) -> Array:
-        substitute = self.model.solve_transposed if transposed else self.model.solve_linear
-        x = substitute(self.A, b)
+    def _solve(self, b: Array, substitute: Callable[[Factorization, Array], Array], transposed: bool) -> Array:
         if self.R_u is None:
-            return x
+            return substitute(self.A, b)
         R_u = self.R_u.T if transposed else self.R_u
-        before, wanted = norm(b), RTOL * norm(b)
-        while before > 0.0:
-            r = b - self.model.matvec(R_u, x)
-            contraction, before = norm(r) / before, norm(r)
-            if not contraction < 0.5:
-                return self._with_fresh_factors(b, transposed)
-            x = x + substitute(self.A, r)
-            if SAFETY * contraction * before <= wanted:  # what the correction leaves: no product to look at it
-                break
-        return x
-
-    def _with_fresh_factors(self, b: Array, transposed: bool) -> Array:
-        self.A, self.R_u = self.model.factors_at(self.state), None
-        x = self._solve(b, transposed)
+        symmetric = self.model.problem.structure != "general"
+        done = (conjugate_gradients if symmetric else conjugate_residuals)(
+            lambda v: self.model.matvec(R_u, v),
+            lambda r: substitute(self.A, r),
+            b,
+            RTOL / SAFETY * norm(b),
+            at_most=WORTH,
+        )
+        if done.converged:
+            return done.x
+        self._renew()
+        x = substitute(self.A, b)
         if not np.isfinite(x).all():
             raise NotConverged(f"{self.model.problem.name}: linearized solve is not finite - check p", ())
         return x
+
+    def _renew(self) -> None:
+        """Factors of R_u itself, from what is assembled already if it is."""
+        free = self.model.problem.matrix_free
+        self.A = self.model.factors_at(self.state) if free else self.model.factorize(self.R_u)
+        self.R_u = None
 
 
 def work(forward: ForwardWork, solves: int, transposed: bool, factors: str) -> Work:
@@ -74,5 +87,6 @@ def work(forward: ForwardWork, solves: int, transposed: bool, factors: str) -> W
         return forward.cold + Work(**{kind: solves})
     if factors == "fresh":
         return forward.cold + forward.factors_at_solution() + Work(**{kind: solves})
-    sweeps = forward.sweeps(solves)
-    return forward.cold + forward.tangent_operator() + Work(matvecs=sweeps, **{kind: solves + sweeps})
+    sweeps, renewals = forward.sweeps(solves), forward.renewals()
+    assemblies = renewals if forward.matrix_free else 1
+    return forward.cold + Work(0, 0, 0, sweeps, assemblies, renewals) + Work(**{kind: solves + sweeps})

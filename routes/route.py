@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from problems.errors import InputError
 from problems.problem import OFFERED_AS, Array, Offers, Problem
+from routes.forward_work import ForwardWork
 from routes.model import Model
-from routes.newton import ForwardWork
 from routes.tally import Work
 
 

@@ -19,7 +19,7 @@ def tangent(model: Model, p: Array, *, factors: Factors = "refined") -> Result:
     """R_u du_i = -dR/dp_i,  dJ/dp_i = J_p_i + J_u du_i."""
     state = model.solve(p)
     lin = model.linearize(state)
-    R_u = LinearizedSolver(model, state, factors)
+    R_u = LinearizedSolver(model, state, factors, solves=len(p))
     gradient = lin.J_p.copy()
     e = np.zeros_like(p)
     for i in range(len(p)):

@@ -15,9 +15,10 @@ from problems.problem import Array, Parameters, Problem, Reference
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.finite_difference import fd_central, fd_one_sided
+from routes.forward_work import ForwardWork
 from routes.implicit_ad import implicit_ad
 from routes.model import Model
-from routes.newton import ForwardWork, Solver
+from routes.newton import Solver
 from routes.route import Result, Route
 from routes.tally import Work
 from routes.tangent import tangent
@@ -58,7 +59,7 @@ def differentiate(
     counted = model.tally.work - before
     state = Model(problem, solver).solve(p)
     known = None if problem.linear else counted
-    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, known, problem.matrix_free)
+    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, known, problem.matrix_free, model.inexact)
     return result, counted, route.cost(len(p), forward, **options)
 
 

@@ -1,0 +1,102 @@
+"""What declared bills are made of: the work of one forward solve, and estimates for solves near it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from routes.newton import Solver
+from routes.tally import Work
+
+
+@dataclass(frozen=True)
+class ForwardWork:
+    """The work of one cold forward solve, and of others: estimates, exact once steps and products are counted.
+
+    cold         counted for one solve at the p in question; a black box counts just that one
+    linear       R is affine in u
+    rtol         of the solver
+    counted      of a whole gradient: how many Newton steps and refinements p needed is taken from it, once known
+    matrix_free  products with R_u need no assembly
+    inexact      Newton steps are, see Solver.newton: k of them with m products take k + m substitutions
+    """
+
+    cold: Work
+    linear: bool = True
+    rtol: float = Solver.rtol
+    counted: Work | None = None
+    matrix_free: bool = False
+    inexact: bool = False
+
+    def polished(self) -> Work:
+        """A cold solve and one step more."""
+        return self.cold if self.linear else self.cold + self._newton(1)
+
+    def full(self, times: int, polish: int) -> Work:
+        """`times` cold solves near p by full steps: what a complex p takes, whatever the solver's are."""
+        if not self.inexact:
+            return self.solves(times, polish)
+        steps = times * (self.cold.newton_iterations + polish)
+        steps = steps if self.counted is None else self.counted.newton_iterations
+        return Work(forward_solves=times, residuals=times * (1 + self._halvings())) + self._newton(steps)
+
+    def solves(self, times: int, polish: int = 0) -> Work:
+        """`times` cold solves near p, each with `polish` steps more: see Model.solve."""
+        if self.inexact:
+            return self._iterated(times, cold=times) or times * self.cold
+        extra = 0 if self.linear else times * polish
+        if self.counted is not None and not self.linear:
+            extra = self.counted.newton_iterations - times * self.cold.newton_iterations
+        return times * self.cold + self._newton(extra)
+
+    def factors_at_solution(self) -> Work:
+        """See Model.factors_at."""
+        return Work() if self.linear else Work(assemblies=1, factorizations=1)
+
+    def sweeps(self, solves: int) -> int:
+        """Products of `solves` linearized solves together: one each, unless they are known."""
+        return solves if self.counted is None else self.counted.matvecs - self.cold.matvecs
+
+    def renewals(self) -> int:
+        """Factorizations after the forward solve."""
+        return 0 if self.counted is None else self.counted.factorizations - self.cold.factorizations
+
+    def warm(self, times: int, h: float) -> Work:
+        """A polished solve and `times` from its state, |R| ~ h away: a step squares that (linear: one is enough)."""
+        if self.inexact and (iterated := self._iterated(1 + times, cold=1)):
+            return iterated
+        each = 1 if self.linear else max(1, math.ceil(math.log2(self._decades(h))))
+        return self.polished() + Work(forward_solves=times, residuals=times) + self._newton(self._near(times * each))
+
+    def chord(self, times: int, h: float) -> Work:
+        """The same on the factors of the first: every step multiplies |R| by about h."""
+        if self.inexact and (iterated := self._iterated(1 + times, cold=1, directions=self.cold.newton_iterations + 1)):
+            return iterated
+        steps = self._near(times * max(1, math.ceil(self._decades(h)) - 1))
+        return self.polished() + Work(times, newton_iterations=steps, residuals=times + steps, solves=steps)
+
+    def _iterated(self, solves: int, cold: int, directions: int | None = None) -> Work | None:
+        """`solves` inexact ones, `cold` from scratch, R_u used by `directions` steps [all]; None if uncounted."""
+        if self.counted is None:
+            return None
+        k, m, f = self.counted.newton_iterations, self.counted.matvecs, self.counted.factorizations
+        assemblies = f if self.matrix_free else (k if directions is None else directions)
+        return Work(solves, k, k + solves + cold * self._halvings(), m, assemblies, f, k + m)
+
+    def _halvings(self) -> int:
+        """Residuals that a cold solve's line searches take."""
+        return self.cold.residuals - self.cold.newton_iterations - self.cold.forward_solves
+
+    def _near(self, estimate: int) -> int:
+        """Newton steps of the perturbed solves together, exactly once they are counted."""
+        if self.counted is None:
+            return estimate
+        return self.counted.newton_iterations - self.polished().newton_iterations
+
+    def _decades(self, h: float) -> float:
+        """log rtol / log h, how often the perturbation must multiply itself to vanish."""
+        return math.log(self.rtol) / math.log(min(h, 0.5))
+
+    @staticmethod
+    def _newton(k: int) -> Work:
+        return Work(newton_iterations=k, residuals=k, assemblies=k, factorizations=k, solves=k)
