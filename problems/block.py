@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from problems.errors import InputError
-from problems.problem import Array, Linearization, Offers, Operator, Parameters, Problem, Traced
+from problems.problem import Array, Fields, Linearization, Offers, Operator, Parameters, Problem, Traced
 
 if TYPE_CHECKING:
     from problems.elements import CompiledResidual
@@ -62,6 +62,7 @@ class Block(Problem):
             upper=THETA_MAX if self.log else np.inf,
             unit="log Pa" if self.log else "Pa",
             label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
+            position=self.centres.T,
         )
 
     @cached_property
@@ -167,3 +168,12 @@ class Block(Problem):
             residual=lambda u, p: internal(u, p) - f,
             objective=lambda u, p: self.objective(u, p, jnp),
         )
+
+    def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:
+        """u, lam (n_nodes, 3), zero on the clamped base; E and dJ/dE of every cell."""
+        E = np.exp(p) if self.log else p
+        vectors = {"u": u} if lam is None else {"u": u, "lambda": lam}
+        on_nodes = {name: np.append(v, 0.0)[self.free] for name, v in vectors.items()}
+        order = np.array([0, 3, 6, 2, 1, 5, 7, 4])  # of scikit-fem's corners, that VTK's come in
+        cells = {"E": E, "dJ_dE": gradient / E if self.log else gradient}
+        return Fields(self.mesh.p.T, "hexahedron", self.mesh.t[order].T, on_nodes, cells)

@@ -68,6 +68,7 @@ class Parameters:
     lower, upper the open interval p_i must lie in, one number for all or (n_p,)
     unit         of p_i for tables, one for all or one each
     label        name of component i (counted from 0)
+    position     (n_p, d), d <= 3, where p_i lives [m], where it lives somewhere
     """
 
     start: Array
@@ -76,6 +77,7 @@ class Parameters:
     upper: Array | float = np.inf
     unit: str | tuple[str, ...] = "1"
     label: Callable[[int], str] = default_label
+    position: Array | None = None
 
     def __post_init__(self) -> None:
         for name in ("start", "scale"):  # integers would truncate every step
@@ -84,6 +86,10 @@ class Parameters:
             raise InputError(
                 f"parameters: start {self.start.shape} and scale {self.scale.shape} - give two vectors of one length,"
                 " scale > 0"
+            )
+        if self.position is not None and self.position.shape not in [(len(self), d) for d in (1, 2, 3)]:
+            raise InputError(
+                f"parameters: positions {self.position.shape} of {len(self)} parameters - give ({len(self)}, d), d <= 3"
             )
 
     def __len__(self) -> int:
@@ -226,6 +232,28 @@ class Problem:
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         """What a person wants beside the gradient, parameter by parameter."""
         return ParameterView()
+
+    def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields | None:
+        """u, lam and dJ/dp (n_p,) on the problem's mesh, or None where it has none."""
+        return None
+
+
+@dataclass(frozen=True)
+class Fields:
+    """What lives on a mesh, for a viewer.
+
+    points     (n, 3) [m]
+    cell_type  meshio's name of the one kind of cell, "hexahedron" say
+    cells      (n_e, k), points of every cell, in meshio's (VTK's) order
+    point_data by name, (n,) or (n, 3)
+    cell_data  by name, (n_e,) or (n_e, 3)
+    """
+
+    points: Array
+    cell_type: str
+    cells: Array
+    point_data: Mapping[str, Array] = field(default_factory=dict)
+    cell_data: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
