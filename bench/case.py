@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from bench import options, registry, selector
@@ -88,3 +90,9 @@ def point(problem: Problem, at: str) -> Array:
     if len(columns) != 1:
         raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
     return problem.parameters.check(next(iter(columns.values())), at)
+
+
+def files(specs: Iterable[ProblemSpec], at: str) -> list[Path]:
+    """The files that problems and `at` read."""
+    texts = [at, *(value for spec in specs for value in spec.options.values() if isinstance(value, str))]
+    return [Path(text) for text in texts if os.path.isfile(text)]

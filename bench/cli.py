@@ -174,7 +174,7 @@ def run(
     partial = chosen(components, directions, seed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
-    files.check(len(problem_specs) * len(route_specs), partial, taken=[store, Path(at)])
+    files.check(len(problem_specs) * len(route_specs), partial, [store, *case.files(problem_specs, at)])
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
     solver = Solver(rtol, max_steps, linear_solver)

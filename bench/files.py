@@ -59,7 +59,8 @@ def _fields(path: Path, outcomes: Sequence[Outcome]) -> str:
 
     (outcome,) = outcomes
     if outcome.fields is None:
-        return f"nothing written to {path}: {outcome.row['route']} on {outcome.row['problem']} gave no fields"
+        status = "gave no fields" if outcome.row["status"] == "ok" else outcome.row["status"]
+        return f"nothing written to {path}: {outcome.row['route']} on {outcome.row['problem']} {status}"
     vtu.write(path, outcome.fields)
     return f"fields in {path}"
 

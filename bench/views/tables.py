@@ -51,8 +51,9 @@ def results(rows: Sequence[Row]) -> Table:
     for name in ("n_u", "n_p", "J", "error", "time", "x fwd"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("work", overflow="fold", min_width=7)
-    for name in ("memory", "tape"):
-        table.add_column(name, justify="right", min_width=6)
+    unrolled = any(row["tape_bytes_per_iteration"] for row in rows)
+    table.add_column("memory", justify="right", min_width=6)
+    table.add_column("tape", justify="right", min_width=len("(0.977 KiB/it)") if unrolled else 6, overflow="fold")
     if several:
         table.add_column("error against", overflow="fold", min_width=7)
     before = None
