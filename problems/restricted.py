@@ -176,12 +176,14 @@ def components(problem: Problem, p: Array, index: Array) -> Restricted:
 
 
 def directions(problem: Problem, p: Array, m: int, seed: int) -> Restricted:
-    """The problem along m random directions v_i = xi_i max(|p_i|, s_i), xi_i normal, from p, where c = 0.
+    """The problem along m random directions v_i = xi_i max(|p_i|, s_i) from p, where c = 0.
 
+    xi_i has either sign and a size of 1/2 to 3/2, so that no direction misses a component, as normal numbers may.
     The bounds of c_j are those that p + v_j c_j keeps; several c_j at once may leave p's domain within them.
     """
     of = problem.parameters
-    xi = np.random.default_rng(seed).standard_normal((m, len(p)))
+    rng = np.random.default_rng(seed)
+    xi = rng.choice([-1.0, 1.0], (m, len(p))) * rng.uniform(0.5, 1.5, (m, len(p)))
     V = (xi * np.maximum(np.abs(p), of.scale)).T
     lower, upper = _room(p, V, of)
     return Restricted(
