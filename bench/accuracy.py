@@ -2,60 +2,118 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench import registry
+from bench.slopes import complex_slopes
 from problems.errors import RoutesError
-from problems.problem import Array, Reference
+from problems.problem import Array, Operator, Reference
+from problems.restricted import Restricted, directions
 from routes.model import Model
 from routes.route import Route
 
 JUDGES = ("complex-step", "tangent")  # where a problem knows no closed form; never the judged route itself
-MANY = 200  # parameters; beyond, these cost too much to be run unasked
+MANY = 200  # parameters; beyond, these judge in random directions: the whole costs too much to be run unasked
+DIRECTIONS, SEED = 3, 20260  # no direction a user's --seed would name
+RTOL = 1e-13  # forward solves of judges in directions
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges g (n_p,) by a reference, or V^T g where directions V (n_p, m) are given."""
+
+    reference: Reference
+    V: Operator | None = None
+
+    @property
+    def whole(self) -> Reference | None:
+        """A reference for every component, where it is one."""
+        return self.reference if self.V is None else None
+
+    def error(self, g: Array) -> tuple[float, str]:
+        """See `error`, and the name of the reference."""
+        return error(g if self.V is None else self.V.T @ g, self.reference)
 
 
 class Judges:
     """References for one problem at one p, each computed once, when first asked for.
 
-    `unaffordable` says of a route why its bill is not paid, or None.
+    `unaffordable` says of a route why its bill for so many parameters is not paid, or None.
     """
 
-    def __init__(self, model: Model, p: Array, unaffordable: Callable[[Route], str | None]) -> None:
+    def __init__(self, model: Model, p: Array, unaffordable: Callable[[Route, int], str | None]) -> None:
         self.model, self.p, self.unaffordable = model, p, unaffordable
-        self._own: Reference | None = None
-        self._asked = False
-        self._gradients: dict[str, Reference | None] = {}
+        self._found: dict[tuple[str, bool], Judge | str] = {}
 
-    def judge(self, route: Route) -> Reference | None:
-        """The problem's own reference, or another exact route's gradient where n_p is small, or None."""
-        if not self._asked:
-            self._own, self._asked = self._sound(self.model.problem.reference(self.p)), True
-        if self._own is not None or len(self.p) > MANY:
-            return self._own
-        for name in JUDGES:
-            if name != route.name:
-                if name not in self._gradients:
-                    self._gradients[name] = self._gradient(registry.find("route", name).load())
-                if self._gradients[name] is not None:
-                    return self._gradients[name]
-        return None
+    def judge(self, route: Route) -> Judge | str:
+        """The problem's own reference, or another exact route's gradient, in full where n_p is small and it can be
+        paid for, else in random directions. A sentence where nobody judges.
+        """
+        reasons: dict[str, str] = {}
+        for name, whole in self._candidates():
+            if name == route.name:
+                continue
+            if (name, whole) not in self._found:
+                self._found[name, whole] = self._ask(name, whole)
+            found = self._found[name, whole]
+            if isinstance(found, Judge):
+                return found
+            reasons[name] = found
+        return ", ".join(filter(None, reasons.values())).replace("; ", ", ")
 
-    def _gradient(self, route: Route) -> Reference | None:
-        if route.objection(self.model.problem) is not None or self.unaffordable(route) is not None:
-            return None
+    def _candidates(self) -> Iterator[tuple[str, bool]]:
+        yield OWN, True
+        yield from ((name, True) for name in JUDGES if len(self.p) <= MANY)
+        yield from ((name, False) for name in JUDGES)
+
+    def _ask(self, name: str, whole: bool) -> Judge | str:
         try:
-            gradient = route.prepare(self.model, self.p)(self.p).gradient
-        except RoutesError:  # a judge that fails is no reason to fail the judged
-            return None
-        return self._sound(Reference(route.name, gradient, norm2(gradient)))
+            if name == OWN:
+                return self._own()
+            return self._by_route(registry.find("route", name).load(), whole)
+        except RoutesError as failure:  # a judge that fails is no reason to fail the judged
+            return f"{name}: {failure}" if name not in str(failure) else str(failure)
+        except Exception as failure:  # nor is one that trips over the code of a plug-in
+            return f"{name}: {type(failure).__name__}: {failure}"
 
-    def _sound(self, reference: Reference | None) -> Reference | None:
-        """A reference that is no finite vector (n_p,) judges nobody."""
-        if reference is None or reference.gradient.shape != self.p.shape or not np.isfinite(reference.gradient).all():
-            return None
-        return reference
+    def _own(self) -> Judge | str:
+        reference = self.model.problem.reference(self.p)
+        return "" if reference is None else self._sound(reference, self.p.shape)
+
+    def _by_route(self, route: Route, whole: bool) -> Judge | str:
+        problem, n = self.model.problem, len(self.p) if whole else DIRECTIONS
+        reason = route.objection(problem) or self.unaffordable(route, n)
+        if reason is not None:
+            return reason if route.name in reason else f"{route.name}: {reason}"
+        if whole:
+            gradient = route.prepare(self.model, self.p)(self.p).gradient
+            return self._sound(Reference(route.name, gradient, norm2(gradient)), self.p.shape)
+        few = directions(problem, self.p, DIRECTIONS, SEED)
+        slopes = self._slopes(route, few)
+        name = f"{route.name} in {DIRECTIONS} random directions"
+        return self._sound(Reference(name, slopes, norm2(slopes)), (DIRECTIONS,), few.V)
+
+    def _slopes(self, route: Route, few: Restricted) -> Array:
+        solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol))
+        if route.name == "complex-step":
+            return complex_slopes(Model(self.model.problem, solver), self.p, np.asarray(few.V))
+        c = few.parameters.start
+        return route.prepare(Model(few, solver), c)(c).gradient
+
+    @staticmethod
+    def _sound(reference: Reference, shape: tuple[int, ...], V: Operator | None = None) -> Judge | str:
+        """A reference that is no finite vector of this shape judges nobody."""
+        if reference.gradient.shape != shape:
+            return f"{reference.name}: gives an array of shape {reference.gradient.shape}, not {shape}"
+        if not np.isfinite(reference.gradient).all():
+            return f"{reference.name}: is not finite"
+        return Judge(reference, V)
+
+
+OWN = "its own reference"
 
 
 def error(gradient: Array, reference: Reference) -> tuple[float, str]:

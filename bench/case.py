@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from bench import options, registry, selector
@@ -11,11 +13,12 @@ from problems.errors import InputError
 from problems.problem import Array, Parameters, Problem
 from problems.tables import read_columns
 from routes.route import Route
+from routes.twin import with_synthetic_data
 
 
 @dataclass(frozen=True)
 class ProblemSpec:
-    """A problem still to be built."""
+    """A problem still to be built, its synthetic data, if it wants any, solved for."""
 
     name: str
     options: dict[str, Any]
@@ -25,7 +28,7 @@ class ProblemSpec:
         problem = self.build(**self.options)
         if not isinstance(problem, Problem) or not isinstance(problem.parameters, Parameters):
             raise TypeError(f"its factory made a {type(problem).__name__}, not a Problem with Parameters")
-        return problem
+        return with_synthetic_data(problem)
 
 
 @dataclass(frozen=True)
@@ -88,3 +91,9 @@ def point(problem: Problem, at: str) -> Array:
     if len(columns) != 1:
         raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
     return problem.parameters.check(next(iter(columns.values())), at)
+
+
+def files(specs: Iterable[ProblemSpec], at: str) -> list[Path]:
+    """The files that problems and `at` read."""
+    texts = [at, *(value for spec in specs for value in spec.options.values() if isinstance(value, str))]
+    return [Path(text) for text in texts if os.path.isfile(text)]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 WRONG_USAGE, INTERRUPTED = 2, 130
 STORE = Path("results") / "routes.sqlite"
+SHOWN = "-"  # --gradient without a file
 
 
 class Routes(click.Group):
@@ -110,6 +111,10 @@ SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use f
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
 LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg"]
 NEWTON = "Factors at every Newton step, or kept and iterated with."
+GRADIENT = "Show the gradient parameter by parameter beside its reference; with a file, write that as CSV instead."
+COMPONENTS = "Only so many components of dJ/dp, drawn at random: the bill of each, and its error."
+DIRECTIONS = "Only the slopes of J along so many random directions."
+VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView; for one problem and one route."
 BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 
 
@@ -123,7 +128,11 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 @click.option("--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most.")
 @click.option("--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True)
 @click.option("--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON)
-@click.option("--gradient", is_flag=True, help="Show the gradient parameter by parameter beside its reference.")
+@click.option("--components", type=int, metavar="M", help=COMPONENTS)
+@click.option("--directions", type=int, metavar="M", help=DIRECTIONS)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
+@click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
+@click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
 @store_option
 @click.option("--no-store", is_flag=True, help="Keep nothing.")
@@ -138,7 +147,11 @@ def run(
     max_steps: int,
     linear_solver: LinearSolver,
     newton: Newton,
-    gradient: bool,
+    components: int | None,
+    directions: int | None,
+    seed: int,
+    gradient: str | None,
+    vtu: Path | None,
     as_json: bool,
     store: Path,
     no_store: bool,
@@ -149,6 +162,8 @@ def run(
     130 interrupted.
     """
     from bench import case
+    from bench.files import Files
+    from bench.partial import chosen
     from bench.rows import as_json as json_line
     from bench.runner import Settings
     from bench.runner import run as run_cases
@@ -161,11 +176,15 @@ def run(
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     if not 0 < rtol < 1 or max_steps < 1:
         raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
+    partial = chosen(components, directions, seed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
+    files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
+    files.check(len(problem_specs) * len(route_specs), partial, [store, *case.files(problem_specs, at)])
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
     solver = Solver(rtol, max_steps, linear_solver, newton)
-    outcomes = run_cases(problem_specs, route_specs, Settings(at, budget, min_time, gradient, solver))
+    settings = Settings(at, budget, min_time, gradient is not None, solver, partial, vtu is not None)
+    outcomes = run_cases(problem_specs, route_specs, settings)
     kept = None if no_store else Store(store)
     if kept is not None:
         kept.check_writable()
@@ -184,10 +203,15 @@ def run(
                 click.echo(json_line(outcome.row))
     finally:  # an interrupt leaves what was measured on the screen, too
         if not as_json:
-            views = [(o.row, o.view) for o in done if o.view is not None]
+            views = [(o.row, o.view) for o in done if o.view is not None and gradient == SHOWN]
             show([o.row for o in done], views, None if no_store or lost else store)
+        said, failed = files.write(done)
+        for line in said:
+            click.echo(line, err=as_json)
     if lost:
-        raise InputError(f"{len(lost)} of {len(done)} rows were not kept: {lost[0]}")
+        failed.append(f"{len(lost)} of {len(done)} rows were not kept: {lost[0]}")
+    if failed:
+        raise InputError("; ".join(failed))
     if debugging():
         click.echo("".join(outcome.traceback or "" for outcome in done), err=True, nl=False)
     if any(outcome.row["status"] == "failed" for outcome in done):

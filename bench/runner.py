@@ -12,14 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from bench.accuracy import Judges, error, norm2
-from bench.bill import Prices, prices, unaffordable
+from bench.accuracy import Judge, Judges, norm2
+from bench.bill import Prices, duration, prices, summary, unaffordable
 from bench.case import ProblemSpec, RouteSpec, point
 from bench.measure import steady
+from bench.partial import Partial
 from bench.rows import Row, empty_row
 from bench.timing import Samples, seconds_of
-from problems.errors import RoutesError
-from problems.problem import Array, Offers, ParameterView, Reference
+from problems.errors import InputError, RoutesError
+from problems.problem import Array, Fields, Offers, ParameterView, Problem, Reference
 from routes.model import Model
 from routes.newton import Solver, State
 from routes.route import Options, Result, Route
@@ -31,30 +32,38 @@ FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in m
 
 @dataclass(frozen=True)
 class Settings:
-    """How cases are run: at which p, up to which bill [s], timed for how long [s], with gradients kept or not."""
+    """How cases are run: at which p, up to which bill [s], timed for how long [s], with gradients kept or not, on
+    the whole of p or on a part, with fields on the mesh or without.
+    """
 
     at: str = "start"
     budget: float = 60.0
     min_time: float = 0.1
     gradient: bool = False
     solver: Solver = field(default_factory=Solver)
+    partial: Partial | None = None
+    fields: bool = False
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A row, its raw timings, what --gradient shows, and the traceback of a failure."""
+    """A row, its raw timings, what --gradient and --vtu show, and the traceback of a failure."""
 
     row: Row
     samples: Samples | None = None
     view: View | None = None
+    fields: Fields | None = None
     traceback: str | None = None
 
 
 @dataclass(frozen=True)
 class View:
-    """A gradient beside its reference and the problem's own columns."""
+    """A gradient at p beside its reference and the problem's own columns; position as in Parameters."""
 
     labels: list[str]
+    units: list[str]
+    position: Array | None
+    p: Array
     gradient: Array
     reference: Reference | None
     columns: ParameterView
@@ -108,11 +117,24 @@ class Workbench:
 
     def __init__(self, spec: ProblemSpec, settings: Settings) -> None:
         self.spec, self.settings = spec, settings
+        self.problem: Problem
         self.build_s, self.problem = seconds_of(spec)
         self.p = point(self.problem, settings.at)
+        self.n_p = len(self.p)
+        if settings.fields and type(self.problem).fields is Problem.fields:
+            raise InputError(f"{self.problem.name}: has no mesh to write fields on - drop --vtu")
+        self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
         self.judges = Judges(self.model(), self.p, self._unaffordable_judge)
         self._priced: tuple[Prices, State | None] | Exception | None = None
+
+    def _restrict(self, partial: Partial | None) -> str | None:
+        """From here on the problem is the one in the few parameters asked for; what they are, None for all."""
+        few = None if partial is None else partial.restrict(self.problem, self.p)
+        if partial is None or few is None:
+            return None
+        self.problem, self.p = few, few.parameters.start.copy()
+        return partial.of(self.n_p)
 
     def model(self) -> Model:
         return Model(self.problem, self.settings.solver)
@@ -124,7 +146,8 @@ class Workbench:
             "problem_options": self.spec.options,
             **_names(spec),
             "at": self.settings.at,
-            "n_param": len(self.p),
+            "n_param": self.n_p,
+            "partial": self.partial,
             "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
         }
         try:
@@ -157,7 +180,10 @@ class Workbench:
 
     def _predict(self, route: Route, options: Options, row: Row) -> str | None:
         """Fill in the predicted bill; why it is not paid, or None."""
-        work = route.cost(len(self.p), self.prices.declared, **options)
+        return self._predict_for(len(self.p), route, options, row)
+
+    def _predict_for(self, n_p: int, route: Route, options: Options, row: Row) -> str | None:
+        work = route.cost(n_p, self.prices.declared, **options)
         tape = None if route.tape is None else route.tape(self.problem, **options)
         row |= {
             "predicted_s": self.prices.seconds(work),
@@ -169,8 +195,15 @@ class Workbench:
     def _affordable(self, route: Route) -> Callable[[Options], bool]:
         return lambda options: self._predict(route, options, {}) is None
 
-    def _unaffordable_judge(self, route: Route) -> str | None:
-        return self._predict(route, route.defaults, {})
+    def _unaffordable_judge(self, route: Route, n_p: int) -> str | None:
+        return self._predict_for(n_p, route, route.defaults, {})
+
+    def _note_whole(self, route: Route, options: Options, row: Row) -> None:
+        """What a partial run would have cost in full."""
+        if self.partial is not None:
+            work = route.cost(self.n_p, self.prices.declared, **options)
+            bill = f"{duration(self.prices.seconds(work))} ({summary(work)})"
+            _note(row, f"{route.name}: whole gradient: predicted {bill}")
 
     def _measure(self, route: Route, options: Options, gradient: Any, model: Model, row: Row) -> Outcome:
         before = model.tally.work
@@ -181,7 +214,10 @@ class Workbench:
         if work != declared:
             _note(row, f"{route.name}: counted work differs from the declared")
         self._judge(route, result, row)
+        if row["tape_bytes"] is not None and options.get("iterations"):
+            row["tape_bytes_per_iteration"] = row["tape_bytes"] / options["iterations"]
         self._note_factors(row)
+        self._note_whole(route, options, row)
         samples, peak = steady(lambda: gradient(self.p), self._forward(), row["first_s"], self.settings.min_time)
         row["peak_bytes"], row["memory_method"] = peak
         row |= {
@@ -192,7 +228,7 @@ class Workbench:
             "forward_ratio": samples.ratio,
             "status": "ok",
         }
-        return Outcome(row, samples, self._view(route, result))
+        return Outcome(row, samples, self._view(route, result), self._fields(result))
 
     def _note_factors(self, row: Row) -> None:
         state = self._price()[1]
@@ -227,12 +263,14 @@ class Workbench:
             "residual": None if result.residual is None else float(result.residual),
             "tape_bytes": None if result.tape is None else int(result.tape),
         }
-        reference = self.judges.judge(route)
-        if reference is not None:
-            row["gradient_error"], row["reference"] = error(g, reference)
-            converged = row["residual"] is not None and row["residual"] <= 10.0 * self.settings.solver.rtol
-            if converged and row["gradient_error"] > WRONG:
-                _note(row, f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
+        judge = self.judges.judge(route)
+        if not isinstance(judge, Judge):
+            _note(row, f"{route.name}: error unknown, nobody judges: {judge}")
+            return
+        row["gradient_error"], row["reference"] = judge.error(g)
+        converged = row["residual"] is not None and row["residual"] <= 10.0 * self.settings.solver.rtol
+        if converged and row["gradient_error"] > WRONG:
+            _note(row, f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
 
     def _price(self) -> tuple[Prices, State | None]:
         """Prices and the state they were measured on; a forward solve that fails is not tried again."""
@@ -262,13 +300,24 @@ class Workbench:
     def _view(self, route: Route, result: Result) -> View | None:
         if not self.settings.gradient:
             return None
-        state = self._price()[1]
-        u = result.u if result.u is not None or state is None else state.u
+        u = self._state_of(result)
         columns = ParameterView() if u is None else self.problem.view(self.p, u, result.lam)
-        parameters = self.problem.parameters
-        units = [parameters.unit_of(i) for i in range(len(self.p))]
-        labels = [f"{parameters.label(i)} [{unit}]" for i, unit in enumerate(units)]
-        return View(labels, np.asarray(result.gradient), self.judges.judge(route), columns)
+        judge = self.judges.judge(route)
+        reference = judge.whole if isinstance(judge, Judge) else None
+        q = self.problem.parameters
+        labels, units = zip(*((q.label(i), q.unit_of(i)) for i in range(len(q))), strict=True)
+        return View([*labels], [*units], q.position, self.p, np.asarray(result.gradient), reference, columns)
+
+    def _fields(self, result: Result) -> Fields | None:
+        u = self._state_of(result)
+        if u is None or not self.settings.fields:
+            return None
+        return self.problem.fields(self.p, u, result.lam, np.asarray(result.gradient))
+
+    def _state_of(self, result: Result) -> Array | None:
+        """u of the route, or of the forward solve that set the prices; None for a black box."""
+        state = self._price()[1]
+        return result.u if result.u is not None or state is None else state.u
 
 
 def _note(row: Row, note: str) -> None:

@@ -19,7 +19,7 @@ from bench.timing import Samples
 from problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
-SCHEMA = 1
+SCHEMA = 2  # 2: columns partial and tape_bytes_per_iteration
 PATIENCE = 60.0  # [s] to wait for another writer
 TABLES = ("cases", "samples", "environments")
 
@@ -74,6 +74,7 @@ class Store:
                 db.execute("BEGIN IMMEDIATE")
                 if self._has_tables(db):
                     self._check_kind(db)
+                    self._add_columns(db)
                 else:
                     self._create(db)
                 yield db
@@ -98,12 +99,24 @@ class Store:
         db.execute(f"PRAGMA application_id = {APPLICATION}")
         db.execute(f"PRAGMA user_version = {SCHEMA}")
 
+    @staticmethod
+    def _add_columns(db: sqlite3.Connection) -> None:
+        """What an older schema lacks is added, absent in its rows."""
+        if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
+            there = {column[1] for column in db.execute("PRAGMA table_info(cases)")}
+            for column in STORED:
+                if column.name not in there:
+                    db.execute(f"ALTER TABLE cases ADD COLUMN {column.name} {column.type}")
+            db.execute(f"PRAGMA user_version = {SCHEMA}")
+
     def _check_kind(self, db: sqlite3.Connection) -> None:
         if db.execute("PRAGMA application_id").fetchone()[0] != APPLICATION:
             raise InputError(f"store {self.path}: is a database of another program - name another file with --store")
         schema = db.execute("PRAGMA user_version").fetchone()[0]
-        if schema != SCHEMA:
-            raise InputError(f"store {self.path}: has schema {schema}, this version needs {SCHEMA} - name another file")
+        if not 1 <= schema <= SCHEMA:
+            raise InputError(
+                f"store {self.path}: has schema {schema}, this version knows 1 to {SCHEMA} - name another file"
+            )
 
     @staticmethod
     def _environment_id(db: sqlite3.Connection) -> str:

@@ -86,6 +86,7 @@ class Bar(Problem):
             upper=THETA_MAX if self.log else math.exp(THETA_MAX),
             unit="log Pa" if self.log else "Pa",
             label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
+            position=self.x[:, None],
         )
         self.last_sensor = int(self.sensors.nodes.max(initial=0))
         self.notes = self._notes()

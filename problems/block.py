@@ -81,15 +81,22 @@ class Block(Problem):
         if noise < 0 or not math.isfinite(noise) or (noise and data != "twin"):
             raise InputError(f"block: noise={noise:g} - choose noise >= 0, for synthetic data (data=twin) only")
         if parametrization is not None and unknown not in ("modulus", "layers"):
-            raise InputError(f"block: parametrization={parametrization} - unknown={unknown} has no moduli, leave it out")
+            raise InputError(
+                f"block: parametrization={parametrization} - unknown={unknown} has no moduli, leave it out"
+            )
         if unknown == "traction" and (load != "traction" or cases > 1):
-            raise InputError(f"block: unknown=traction with load={load}, cases={cases} - it takes one case of load=traction")
+            raise InputError(
+                f"block: unknown=traction with load={load}, cases={cases} - it takes one case of load=traction"
+            )
         if derivatives == "hand" and unknown not in ("modulus", "layers", "constants"):
-            raise InputError(f"block: derivatives=hand are by material constants, not by {unknown} - take derivatives=ad")
+            raise InputError(
+                f"block: derivatives=hand are by material constants, not by {unknown} - take derivatives=ad"
+            )
         self.law_name, self.nu, self.hand = law, nu, derivatives == "hand"
         self.load_kind, self.unknown_name = load, unknown
         if self.hand and self.law.hand is None:
             raise InputError(f"block: derivatives=hand exist for neo-hookean and mooney-rivlin, not {law} - take ad")
+        self.law.check(self.law.of_modulus(1.0, nu))
         cells, lengths = (nx or n, ny or n, nz or n), _lengths(size)
         self.body: Body = bodies.read("block", mesh) if mesh else bodies.box("block", element, cells, lengths)
         self.loaded: Facets = self.body.surface(loaded)
@@ -128,7 +135,9 @@ class Block(Problem):
         body = self.body
         if data is not None and data != "twin":
             if markers or where is not None or len(self.directions) > 1:
-                raise InputError("block: data=FILE holds its own points and one load case - leave out sensors, markers, cases")
+                raise InputError(
+                    "block: data=FILE holds its own points and one load case - leave out sensors, markers, cases"
+                )
             self.probes, d = probes.measured(body, data)
             self.d: Array | None = d[None]
             if (greatest := float(np.abs(d).max())) > body.size:
@@ -279,8 +288,7 @@ class Block(Problem):
 
     def _follower_tangents(self, u_f: Array, s: Setting, case: int) -> Array:
         """df_ext/du_f, (n_f, (3 n_a)^2)."""
-        n_f, n_a, _ = u_f.shape
-        return np.asarray(self._follower_derivative(u_f, s.load, s.X, case)).reshape(n_f, -1)
+        return np.asarray(self._follower_derivative(u_f, s.load, s.X, case)).reshape(len(u_f), -1)
 
     @cached_property
     def _follower_derivative(self) -> Callable[..., Any]:
@@ -310,7 +318,9 @@ class Block(Problem):
 
     def _data(self) -> Array:
         if self.d is None:
-            raise InputError("block: data=twin are not made yet - solve for them: routes.twin.with_synthetic_data(block)")
+            raise InputError(
+                "block: data=twin are not made yet - solve for them: routes.twin.with_synthetic_data(block)"
+            )
         return self.d
 
     def linearize(self, u: Array, p: Array) -> Linearization:
@@ -359,7 +369,7 @@ class Block(Problem):
     # --- what a person looks at
 
     def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:
-        """u and lam (n_nodes, 3) of every load case; E and the gradient of every cell, or the gradient of every node."""
+        """u and lam (n_nodes, 3) of every load case; E and dJ/dE of every cell, dJ/dX of every node, as p has them."""
         s, geometry = self.setting(p), self.body.geometry
         every = np.arange(len(geometry.X))
         vectors = {"u": (u, s)} if lam is None else {"u": (u, s), "lambda": (lam, replace(s, load=0.0 * s.load))}
@@ -370,7 +380,10 @@ class Block(Problem):
                 point_data[name + suffix] = self.displacements(v, at, case, every)
         if self.unknown.group is not None:
             E = np.exp(p) if self.log else p
-            cell_data = {"E": E[self.unknown.group], "dJ_dE": (gradient / E if self.log else gradient)[self.unknown.group]}
+            cell_data = {
+                "E": E[self.unknown.group],
+                "dJ_dE": (gradient / E if self.log else gradient)[self.unknown.group],
+            }
         if self.unknown.nodes is not None:
             point_data["dJ_dX"] = np.zeros_like(s.X)
             point_data["dJ_dX"][self.unknown.nodes] = gradient.reshape(-1, 3)

@@ -66,7 +66,7 @@ class Body:
             axis, end = SIDES[where]
             value = self.box[end, axis]
         else:
-            name, equals, text = where.partition("=")
+            name, _, text = where.partition("=")
             try:
                 axis, value = AXES[name.strip()], float(text)
             except (KeyError, ValueError):
@@ -109,7 +109,9 @@ def read(who: str, path: str | Path) -> Body:
         has = ", ".join(found.cells_dict) or "no cells"
         raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(READABLE)}")
     if np.shape(found.points)[1:] != (3,):
-        raise InputError(f"{who}: mesh={path} has points of {np.shape(found.points)[-1]} coordinates - it needs x, y, z")
+        raise InputError(
+            f"{who}: mesh={path} has points of {np.shape(found.points)[-1]} coordinates - it needs x, y, z"
+        )
     # scikit-fem matches facets by their corners only
     corners = {"triangle6": ("triangle", 3), "quad8": ("quad", 4), "quad9": ("quad", 4)}
     for block in found.cells:

@@ -69,16 +69,21 @@ class Element:
     def outside(self, xi: Array) -> Array:
         """How far xi (..., 3) lies outside the reference element (...,); negative inside."""
         below = -xi.min(axis=-1)
-        return np.maximum(below, xi.max(axis=-1) - 1.0 if self.name == "hex8" else xi.sum(axis=-1) - 1.0)
+        return np.asarray(np.maximum(below, xi.max(axis=-1) - 1.0 if self.name == "hex8" else xi.sum(axis=-1) - 1.0))
 
     def on_side(self, side: int, s: Array) -> tuple[Array, Array]:
         """Points s (2, n_q) of the reference facet on a side: xi (3, n_q), outward d xi_1 x d xi_2 (n_q, 3)."""
         domain = self.basis.refdom
         corners = np.asarray(domain.p)[:, domain.facets[side]]  # (3, corners)
         pairs = [self.facet_basis.lbasis(s, k) for k in range(corners.shape[1])]
-        xi = sum(np.multiply.outer(v, np.broadcast_to(N, s.shape[1:])) for v, (N, _) in zip(corners.T, pairs, strict=True))
+        xi = sum(
+            np.multiply.outer(v, np.broadcast_to(N, s.shape[1:])) for v, (N, _) in zip(corners.T, pairs, strict=True)
+        )
         along = [
-            sum(np.multiply.outer(np.broadcast_to(dN[i], s.shape[1:]), v) for v, (_, dN) in zip(corners.T, pairs, strict=True))
+            sum(
+                np.multiply.outer(np.broadcast_to(dN[i], s.shape[1:]), v)
+                for v, (_, dN) in zip(corners.T, pairs, strict=True)
+            )
             for i in (0, 1)
         ]
         normal = np.cross(*along)
@@ -102,7 +107,7 @@ class Geometry:
     @cached_property
     def orientation(self) -> Array:
         """(n_e, 1), the sign of det J: cells may be numbered either way round."""
-        return np.sign(self._volumes(self.X, np)[2][:, :1])
+        return np.asarray(np.sign(self._volumes(self.X, np)[2][:, :1]))
 
     def _volumes(self, X: Any, xp: Any) -> tuple[Any, Any, Any]:
         dN_ref, w = self._reference
@@ -201,7 +206,7 @@ class Facets:
     @cached_property
     def centres(self) -> Array:
         """(n_f, 3) [m]."""
-        return np.einsum("fqa,fai->fqi", self.N, self.geometry.X[self.nodes]).mean(axis=1)
+        return np.asarray(np.einsum("fqa,fai->fqi", self.N, self.geometry.X[self.nodes]).mean(axis=1))
 
     def areas(self, X: Any, xp: Any) -> Any:
         """dA (n_f, n_q) [m^2] for nodes at X (n_nodes, 3)."""

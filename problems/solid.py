@@ -2,8 +2,8 @@
 
     Pi(u, q) = sum over points of W(I + grad u, q) dx,     f_int = dPi/du,     K = d^2 Pi/du^2
 
-The energy is written once, in jax.numpy. Routes that trace differentiate Pi; NumPy routes get f_int from the same Pi and
-K from the moduli A = d^2 W/dF^2 at every point, contracted by BLAS: a tenth of the time XLA takes for it.
+The energy is written once, in jax.numpy. Routes that trace differentiate Pi; NumPy routes get f_int from that Pi and K
+from the moduli A = d^2 W/dF^2 at every point, contracted by BLAS: a tenth of the time XLA takes for it.
 """
 
 from __future__ import annotations

@@ -12,12 +12,11 @@ from problems.errors import InputError
 from problems.problem import Array
 
 
-def read_columns(
-    path: str | Path, names: tuple[str, ...] | None, blank: tuple[str, ...] = ()
-) -> dict[str, Array]:
+def read_columns(path: str | Path, names: tuple[str, ...] | None, blank: tuple[str, ...] = ()) -> dict[str, Array]:
     """Read the columns `names` (all of them, where None) of a CSV file as finite float64 arrays (n_rows,).
 
-    In the columns `blank` an empty cell is NaN: not measured. Raises InputError for a file that cannot be read, a missing column, text, NaN or infinity, naming the line.
+    In the columns `blank` an empty cell is NaN: not measured.
+    Raises InputError for a file that cannot be read, a missing column, text, NaN or infinity, naming the line.
     """
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:

@@ -81,7 +81,9 @@ def layers(body: Body, law: Law, nu: float, log: bool, blank: bool, count: int) 
     z = (np.arange(count) + 0.5) / count
     empty = np.setdiff1d(np.arange(count), layer)
     if empty.size:
-        raise InputError(f"{body.who}: layers={count}, but no cell's centre lies in layer {empty[0] + 1} - choose fewer")
+        raise InputError(
+            f"{body.who}: layers={count}, but no cell's centre lies in layer {empty[0] + 1} - choose fewer"
+        )
     middle = np.stack([np.full(count, 0.5)] * 2 + [z], axis=1)
     start = np.ones(count) if blank else 1.0 + 0.3 * z
     position = body.box[0] + middle * (body.box[1] - body.box[0])
@@ -154,7 +156,7 @@ def shape(body: Body, where: str, held: Array) -> Unknown:
     if not nodes.size:
         raise InputError(f"{body.who}: surface={where}: all its nodes are clamped or loaded - choose a free surface")
     X, n = body.geometry.X, len(body.geometry.X)
-    index = np.arange(3 * n)  # into (X, p)
+    index: Array = np.arange(3 * n)  # into (X, p)
     moved = np.ravel(3 * nodes[:, None] + np.arange(3))
     index[moved] = 3 * n + np.arange(len(moved))
     index = index.reshape(n, 3)

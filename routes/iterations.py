@@ -114,9 +114,7 @@ def conjugate_gradients(matvec: Callable[[Any, Any], Any], f: Callable[[Any], An
     return Iteration(start, step)
 
 
-def stationary(
-    matvec: Callable[[Any, Any], Any], f: Callable[[Any], Any], weight: Callable[[Any], Any]
-) -> Iteration:
+def stationary(matvec: Callable[[Any, Any], Any], f: Callable[[Any], Any], weight: Callable[[Any], Any]) -> Iteration:
     """u <- u + w r: Richardson's iteration where w is a number, Jacobi's where it is 1 / diag K."""
 
     def start(at: Any) -> tuple[Any, ...]:

@@ -41,7 +41,9 @@ def check(*, inner: str | None, iterations: int | None, newton: int | None, chec
         if count is not None and count < 1:
             raise InputError(f"unrolled-ad: {name}={count} - choose at least 1")
     if inner == "direct" and (newton, checkpoint) != (None, None):
-        raise InputError("unrolled-ad: inner=direct counts its Newton steps by iterations= and keeps them all - give no more")
+        raise InputError(
+            "unrolled-ad: inner=direct counts its Newton steps by iterations= and keeps them all - give no more"
+        )
 
 
 def chosen(problem: Problem, inner: str | None) -> str:
@@ -126,7 +128,9 @@ def near(problem: Problem, u: Array) -> Array:
     return u * (1.0 + 1e-4 * np.sin(np.arange(len(u))))
 
 
-def tape(problem: Problem, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None) -> int | None:
+def tape(
+    problem: Problem, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None
+) -> int | None:
     """None for factors: their fill is not known before."""
     inner = chosen(problem, inner)
     if inner == "direct":
@@ -168,9 +172,7 @@ def unrolled_ad(
     return through_iterations(model, p, str(inner), iterations, newton, checkpoint)
 
 
-def through_iterations(
-    model: Model, p: Array, inner: str, k: int, newton: int, checkpoint: int | None
-) -> Gradient:
+def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, checkpoint: int | None) -> Gradient:
     """Every linear iteration of every Newton step traced (jax.lax.scan) and compiled."""
     from problems.jax64 import jax
     from routes.differentiable import held_bytes

@@ -16,6 +16,7 @@ from routes.model import Model
 from routes.newton import Solver
 from routes.route import Route
 
+
 def top(block: Block, u: np.ndarray) -> np.ndarray:
     """Displacements of the nodes on the top, (m, 3)."""
     return block.supports.displacements(u, 0.0, 0, block.loaded.node_set, np)

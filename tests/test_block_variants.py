@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import relative_error, somewhere
+from conftest import relative_error
 
 from problems.block import Block
 from problems.problem import Array
-from problems.sparse import BlockDiagonal
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.finite_difference import fd_central, fd_one_sided
@@ -40,7 +38,14 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "grip load": {"load": "displacement", "unknown": "load"},
     "tet4": {"element": "tet4"},
     "tet10 shape": {"element": "tet10", "ny": 1, "nz": 1, "unknown": "shape", "surface": "right"},
-    "markers": {"markers": 6, "components": "in-plane", "face": "right", "data": "twin", "noise": 1e-3, "size": "1,2,1"},
+    "markers": {
+        "markers": 6,
+        "components": "in-plane",
+        "face": "right",
+        "data": "twin",
+        "noise": 1e-3,
+        "size": "1,2,1",
+    },
     "twin traction": {"unknown": "traction", "data": "twin", "size": "2"},
 }
 TIGHT = Solver(rtol=1e-14)
@@ -53,7 +58,14 @@ def test_every_route_gives_the_gradient_of_every_kind_of_block(name: str) -> Non
     p = near_start(problem)
     exact = complex_step.prepare(Model(problem, TIGHT), p)(p).gradient
     J = Model(problem, TIGHT).solve(p).J
-    tolerances = {tangent: 1e-11, adjoint: 1e-11, implicit_ad: 1e-11, unrolled_ad: 1e-8, fd_central: 1e-7, fd_one_sided: 1e-5}
+    tolerances = {
+        tangent: 1e-11,
+        adjoint: 1e-11,
+        implicit_ad: 1e-11,
+        unrolled_ad: 1e-8,
+        fd_central: 1e-7,
+        fd_one_sided: 1e-5,
+    }
     for route, tolerance in tolerances.items():
         if route.objection(problem) is None:
             options = {"start": "chord"} if route in (fd_central, fd_one_sided) else {}

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-HEAVY = {"jax", "scipy", "pandas", "skfem", "pyarrow"}
+HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow"}
 FORBIDDEN = {"problems": {"routes", "bench"}, "routes": {"bench"}}
 FLOORS = ("problems", "routes", "bench")
 CONTRACT = {"problem", "errors", "chain", "sparse", "jax64"}  # what routes may know of floor 1: no single problem
@@ -55,7 +55,7 @@ def test_routes_know_the_contract_of_problems_only() -> None:
 
 def test_heavy_libraries_are_imported_late() -> None:
     """Only the modules about JAX import it on top, and nothing imports those on top."""
-    on_jax = "problems.jax64 problems.elements problems.materials problems.spectral"
+    on_jax = "problems.jax64 problems.solid problems.materials problems.spectral"
     traced = {*on_jax.split(), "routes.differentiable", "routes.iterations", "routes.unrolled_newton"}
     light = [p for floor in FLOORS for p in modules(floor) if f"{floor}.{p.stem}" not in traced]
     assert len(light) == sum(len(modules(floor)) for floor in FLOORS) - len(traced)

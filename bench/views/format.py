@@ -20,7 +20,7 @@ def seconds(value: float | None) -> str:
     return "" if value is None else duration(value)
 
 
-def bytes_(value: int | None, resolution: int = 0) -> str:
+def bytes_(value: float | None, resolution: int = 0) -> str:
     """Below what can be resolved there is nothing to tell apart."""
     if value is None:
         return ""

@@ -51,13 +51,14 @@ def results(rows: Sequence[Row]) -> Table:
     for name in ("n_u", "n_p", "J", "error", "time", "x fwd"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("work", overflow="fold", min_width=7)
-    for name in ("memory", "tape"):
-        table.add_column(name, justify="right", min_width=6)
+    unrolled = any(row["tape_bytes_per_iteration"] for row in rows)
+    table.add_column("memory", justify="right", min_width=6)
+    table.add_column("tape", justify="right", min_width=len("(0.977 KiB/it)") if unrolled else 6, overflow="fold")
     if several:
         table.add_column("error against", overflow="fold", min_width=7)
     before = None
     for row in rows:
-        problem = named("problem", row)
+        problem = titled(row)
         if problem != before:
             table.add_row(Text(problem, style="bold"))
             before = problem
@@ -85,11 +86,16 @@ def _cells(row: Row) -> list[Text]:
             ratio(row["forward_ratio"]),
             _work(row, "work"),
             bytes_(row["peak_bytes"], RESOLUTION),
-            bytes_(row["tape_bytes"]),
+            _tape(row),
         ]
     else:
         cells += [row["status"], "", "", "", _work(row, "predicted_work"), "", ""]
     return [Text(cell, style=_style(row)) for cell in cells]
+
+
+def _tape(row: Row) -> str:
+    each = row["tape_bytes_per_iteration"]
+    return bytes_(row["tape_bytes"]) + ("" if each is None else f" ({bytes_(each)}/it)")
 
 
 def _work(row: Row, which: str) -> str:
@@ -104,6 +110,11 @@ def named(kind: registry.Kind, row: Row) -> str:
     except InputError:  # a stored row of a plug-in that is gone
         return selector(name, options, {})
     return selector(name, options, {n: o.default for n, o in options_of(factory).items()})
+
+
+def titled(row: Row) -> str:
+    """The problem, and which part of its gradient."""
+    return named("problem", row) + (f", {row['partial']}" if row["partial"] else "")
 
 
 def remarks(rows: Sequence[Row]) -> list[Text]:
@@ -132,7 +143,7 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
 
 def gradient(row: Row, view: View) -> Table:
     """Parameter by parameter: the route's gradient beside the reference and what the problem adds."""
-    title = f"{named('problem', row)} by {named('route', row)}"
+    title = f"{titled(row)} by {named('route', row)}"
     table = Table(box=None, pad_edge=False, title=Text(title), title_justify="left", title_style="bold")
     reference = view.reference
     table.add_column("p", no_wrap=True)
@@ -155,5 +166,6 @@ def gradient(row: Row, view: View) -> Table:
         values += [column[i] for column in view.columns.columns.values()]
         mark = [] if blind is None else [view.columns.mark if blind[i] else ""]
         hidden = blind is not None and blind[i]
-        table.add_row(Text(view.labels[i]), *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
+        label = Text(f"{view.labels[i]} [{view.units[i]}]")
+        table.add_row(label, *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
     return table
