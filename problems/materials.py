@@ -81,8 +81,8 @@ def ogden(F: Any, q: Any) -> Any:
     """W = sum_r mu_r/alpha_r (sum_i lambar_i^alpha_r - 3) + volumetric, q = (mu1, mu2, mu3, kappa) [Pa] (Ogden 1972).
 
     lambar_i = J^(-1/3) lambda_i the isochoric principal stretches, alpha = (1.3, 5, -2) the exponents of that paper.
-    Small strains: mu = sum_r mu_r alpha_r / 2, bulk modulus kappa. `problems.spectral` says for which stretches the
-    powers are exact to rounding; beyond, W is still the energy of an isotropic solid, of slightly different powers.
+    Small strains: mu = sum_r mu_r alpha_r / 2, bulk modulus kappa. `problems.spectral` says to how many digits
+    the powers are known; where few, W is still the energy of an isotropic solid and its derivatives are exact.
     """
     *mu, kappa = q
     J, cof = det(F), cofactor(F)
@@ -127,7 +127,7 @@ class Law:
             lowest = float(np.min(np.real(c)))
             if positive and not lowest > 0.0:
                 raise InputError(
-                    f"{self.name}: {name} = {lowest:g} Pa leaves the energy without lower bound"
+                    f"{self.name}: {name} = {lowest:g} Pa, so the energy may have no lower bound"
                     f" - choose {name} > 0 (where E and nu set it, a larger nu)"
                 )
 

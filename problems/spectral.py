@@ -62,7 +62,7 @@ def by_jacobians(f: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def power_trace(e1: Any, e2: Any, e3: Any, s: float) -> Any:
-    """sum_i x_i^s of the eigenvalues x_i > 0 (or near it in the complex plane), s >= 0 or s = -1, by jax.numpy.
+    """sum_i x_i^s of the eigenvalues x_i > 0 (or near it in the complex plane) for any real s, by jax.numpy.
 
     e1 = sum x_i, e2 = x_1 x_2 + x_2 x_3 + x_3 x_1, e3 = x_1 x_2 x_3 are scalars. Holomorphic, differentiable to any
     order, at the cost of one sum over the nodes an order.

@@ -247,6 +247,6 @@ def test_an_energy_without_lower_bound_is_refused() -> None:
     law.check(law.of_modulus(1.0, 0.15))
     q = law.of_modulus(1.0, 0.1)
     assert law.W(20.0 * IDENTITY, q) < 0
-    with pytest.raises(InputError, match=r"mooney-rivlin: c = -0.0340909 Pa leaves .* - choose c > 0") as caught:
+    with pytest.raises(InputError, match=r"mooney-rivlin: c = -0.0340909 Pa, so .* - choose c > 0") as caught:
         law.check(q)
     assert "\n" not in str(caught.value)
