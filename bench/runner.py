@@ -166,12 +166,15 @@ class Workbench:
         objection = route.objection(self.problem, **spec.options)
         if objection is not None:
             return Outcome(row | {"status": "skipped", "reason": objection})
-        reason = self._predict(route, route.expect(model, p, **spec.options), row)
+        expected = route.expect(model, p, **spec.options)
+        reason = self._predict(route, expected, row)
         if reason is not None:
+            self._note_whole(route, expected, row)
             return Outcome(row | {"status": "skipped", "reason": reason})
         resolve_s, options = seconds_of(lambda: route.resolve(model, p, self._affordable(route), **spec.options))
         reason = self._predict(route, options, row)
         row["route_options"] = options
+        self._note_whole(route, options, row)
         if reason is not None:
             return Outcome(row | {"status": "skipped", "reason": reason})
         prepare_s, gradient = seconds_of(lambda: route.prepare(model, p, **options))
@@ -217,7 +220,6 @@ class Workbench:
         if row["tape_bytes"] is not None and options.get("iterations"):
             row["tape_bytes_per_iteration"] = row["tape_bytes"] / options["iterations"]
         self._note_factors(row)
-        self._note_whole(route, options, row)
         samples, peak = steady(lambda: gradient(self.p), self._forward(), row["first_s"], self.settings.min_time)
         row["peak_bytes"], row["memory_method"] = peak
         row |= {

@@ -33,7 +33,7 @@ PARTS: dict[str, Callable[[Problem, Array], Restricted]] = {
     "components": lambda problem, p: components(problem, p, np.arange(0, len(p), 2)),
     "directions": lambda problem, p: directions(problem, p, 3, seed=1),
 }
-SMALL = ("bar[n=1]", "bar", "bar[raw,alpha]", "duffing", "block[n=2]", "block[raw]")
+SMALL = ("bar[n=1]", "bar[raw,alpha]", "duffing", "block[n=2]")
 
 
 def parts() -> Iterator[tuple[str, str, Route, dict]]:
@@ -310,6 +310,14 @@ def test_the_seed_is_the_users_and_the_table_says_which_part(cli) -> None:
     assert "note: bar: complex-step: whole gradient: predicted " in out
     assert "(8 fwd)" in out
     assert sum(line.startswith("log E_") for line in out.splitlines()) == 4
+
+
+def test_a_part_too_dear_tells_the_bill_of_the_whole_too(cli) -> None:
+    command = "run --json --no-store --budget 1e-9 --problem bar --route fd-central --components 2"
+    (row,) = cli(*command.split()).rows
+    assert (row["status"], row["partial"]) == ("skipped", "2 of 8 components")
+    assert "(4 fwd) > --budget" in row["reason"]
+    assert "(16 fwd)" in row["note"]
 
 
 @pytest.mark.parametrize("count", ["8", "9", "1000"])
