@@ -1,4 +1,4 @@
-"""What the block's parts cost against each other: gradient, assembly, factorization, memory, growth.
+"""What the block's parts cost against each other: gradient, assembly, factorization, inexact steps, memory, growth.
 
     python -m bench.studies.block_limits
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -20,10 +21,14 @@ from bench.timing import seconds_of
 from bench.views.format import bytes_, seconds
 from bench.views.tables import console
 from problems.block import Block
+from problems.problem import Array
 from routes.model import Model
+from routes.newton import Solver, State
 from routes.refinement import LinearizedSolver
 
 SIZES = (8, 12, 16, 20)
+INEXACT_AT = (12, 16)
+LARGEST = 24  # 45 000 unknowns: forward solve and adjoint within 4 GiB
 REPEATS = 5
 
 
@@ -45,23 +50,64 @@ def parts(n: int) -> Parts:
     block = Block(n=n)
     p, model = block.parameters.start, Model(block)
 
-    def gradient_after(state: Any) -> Any:
-        lin = model.linearize(state)
-        return lin.R_p.T @ LinearizedSolver(model, state, "refined").solve_transposed(-lin.J_u)
-
     state = model.solve(p)
-    gradient_after(state)
-    peak, _ = peak_of(lambda: gradient_after(model.solve(p)))
+    gradient_after(model, state)
+    peak, _ = peak_of(lambda: gradient_after(model, model.solve(p)))
     K = block.tangent(state.u, p)
     return Parts(
         n_u=block.n_state,
         forward=steady_seconds(lambda: model.solve(p)),
-        gradient=steady_seconds(lambda: gradient_after(state)),
+        gradient=steady_seconds(lambda: gradient_after(model, state)),
         assembly=steady_seconds(lambda: block.tangent(state.u, p)),
         factorization=steady_seconds(lambda: model.factorize(K)),
         factors=state.factors.nbytes,
         peak=peak,
     )
+
+
+def gradient_after(model: Model, state: State) -> Array:
+    """The refined adjoint gradient at a solved state."""
+    lin = model.linearize(state)
+    return np.asarray(lin.R_p.T @ LinearizedSolver(model, state, "refined").solve_transposed(-lin.J_u))
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Medians of REPEATS calls, taken in turns: seconds of forward solve and gradient by full and inexact steps."""
+
+    full: tuple[float, float]
+    inexact: tuple[float, float]
+
+    @property
+    def forward_gain(self) -> float:
+        return self.full[0] / self.inexact[0]
+
+    @property
+    def total_gain(self) -> float:
+        return sum(self.full) / sum(self.inexact)
+
+
+def steps(n: int) -> Steps:
+    """Full against inexact Newton steps: both in turns, so that what else the machine does falls on both."""
+    block = Block(n=n)
+    p = block.parameters.start
+    models = [Model(block, Solver(newton=newton)) for newton in ("full", "inexact")]
+    taken: list[list[tuple[float, float]]] = [[], []]
+    for _ in range(1 + REPEATS):
+        for model, times in zip(models, taken, strict=True):
+            forward, state = seconds_of(partial(model.solve, p))
+            times.append((forward, seconds_of(partial(gradient_after, model, state))[0]))
+            del state  # its factors leave their analysis to the next
+    full, inexact = (tuple(map(median, zip(*times[1:], strict=True))) for times in taken)
+    return Steps((full[0], full[1]), (inexact[0], inexact[1]))
+
+
+def largest() -> tuple[int, int]:
+    """n_u and the peak bytes of a forward solve and its gradient, PARDISO's factors included."""
+    block = Block(n=LARGEST)
+    model = Model(block)
+    peak, _ = peak_of(lambda: gradient_after(model, model.solve(block.parameters.start)))
+    return block.n_state, peak
 
 
 def steady_seconds(call: Callable[[], Any]) -> float:
@@ -102,6 +148,14 @@ def main() -> None:
     for name in ("forward", "gradient", "assembly", "factorization"):
         slope = np.polyfit(log_n_u, np.log([getattr(m, name) for m in measured]), 1)[0]
         out.print(f"{name} ~ n_u^{slope:.2f}")
+    for n in INEXACT_AT:
+        s = steps(n)
+        out.print(
+            f"n = {n}: inexact steps {seconds(s.inexact[0])}, full {seconds(s.full[0])}: {s.forward_gain:.2f} x;"
+            f" with the gradient {s.total_gain:.2f} x"
+        )
+    n_u, peak = largest()
+    out.print(f"n = {LARGEST}: {n_u} unknowns, forward and gradient peak at {bytes_(peak)}")
 
 
 if __name__ == "__main__":
