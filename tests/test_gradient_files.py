@@ -90,7 +90,7 @@ def test_fields_on_the_mesh_are_read_back(cli, parametrization: str) -> None:
     (cells,) = mesh.cells
     assert cells.type == "hexahedron"
     x = mesh.points[cells.data]  # (27, 8, 3)
-    np.testing.assert_allclose(x.mean(axis=1), block.centres.T, atol=1e-15)
+    np.testing.assert_allclose(x.mean(axis=1), block.parameters.position, atol=1e-15)
     for corner, right, behind, above in ((0, 1, 3, 4), (6, 7, 5, 2)):  # VTK's hexahedron: right-handed, edge by edge
         edges = np.stack([x[:, b] - x[:, corner] for b in (right, behind, above)], axis=1)
         np.testing.assert_allclose(np.abs(np.linalg.det(edges)), 1 / 27, rtol=1e-12)
