@@ -43,12 +43,13 @@ def conjugate_gradients(
     rate: float = math.inf,
     at_most: int = 50,
     definite: bool = False,
+    tried: int = TRIED,
 ) -> Iterated:
     """x with |b - A x|_inf <= wanted expected, A = A^T, M = M^T (Hestenes & Stiefel 1952; no conjugation).
 
-    `rate` is the contraction to expect before any was seen. Gives up as soon as more than `at_most` products are to
-    be expected. Breaks down where A and M disagree on the sign of a direction's energy, for one of them is indefinite
-    then; where both have to be `definite`, at any negative one. Real numbers only.
+    `rate` is the contraction to expect before any was seen. Gives up after `at_most` products, or as soon as more are
+    to be expected once `tried` were made. Breaks down where A and M disagree on the sign of a direction's energy, for
+    one of them is indefinite then; where both have to be `definite`, at any negative one. Real numbers only.
     """
     x, r, z = np.zeros_like(b), b, M_solve(b)
     d, rz, alpha = z, _dot(r, z), 1.0
@@ -64,7 +65,7 @@ def conjugate_gradients(
         x, r = x + alpha * d, r - alpha * Ad
         size = _norm(r)
         rate = (size / start) ** (1.0 / k)
-        if _hopeless(k, rate, size, wanted, at_most):
+        if _hopeless(k, rate, size, wanted, at_most, tried):
             return Iterated(x, k, rate, False)
         z = M_solve(r)
         rz, rz_before = _dot(r, z), rz
@@ -116,8 +117,8 @@ def _small(rate: float, size: float, wanted: float) -> bool:
     return size == 0.0 or rate * size <= wanted
 
 
-def _hopeless(k: int, rate: float, size: float, wanted: float, at_most: int) -> bool:
-    return not math.isfinite(size) or k >= at_most or (k >= TRIED and k + products_to(rate, size, wanted) > at_most)
+def _hopeless(k: int, rate: float, size: float, wanted: float, at_most: int, tried: int = TRIED) -> bool:
+    return not math.isfinite(size) or k >= at_most or (k >= tried and k + products_to(rate, size, wanted) > at_most)
 
 
 def _dot(a: Array, b: Array) -> Any:

@@ -45,7 +45,7 @@ class MultigridFactorization:
     def solve(self, b: Array) -> Array:
         wanted = RTOL * float(np.abs(b).max(initial=0.0))
         done = conjugate_gradients(
-            self._A.__matmul__, self._cycle.__matmul__, b, wanted, at_most=AT_MOST, definite=True
+            self._A.__matmul__, self._cycle.__matmul__, b, wanted, at_most=AT_MOST, definite=True, tried=AT_MOST
         )
         if done.breakdown is not None:
             raise SingularMatrix(self._indefinite(done.breakdown))

@@ -176,7 +176,7 @@ def test_what_multigrid_cannot_solve_is_said(kind: str) -> None:
 
 
 def test_multigrid_finds_indefinite_matrices_and_says_where_it_stalls(monkeypatch: pytest.MonkeyPatch) -> None:
-    K, b = BLOCK.tangent(np.zeros(BLOCK.n_state), START), RNG.standard_normal(BLOCK.n_state)
+    K, b = BLOCK.tangent(np.zeros(BLOCK.n_state), START), np.random.default_rng(3).standard_normal(BLOCK.n_state)
     for shift in (0.3, 100.0):  # some eigenvalues negative, or all
         data = K.data.copy()
         data[K.pattern.indptr[:-1]] -= shift * K.diagonal.min()
