@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,7 @@ from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.finite_difference import fd_central, fd_one_sided
 from routes.implicit_ad import implicit_ad
+from routes.route import Route
 from routes.tangent import tangent
 from routes.unrolled_ad import unrolled_ad
 
@@ -58,7 +61,14 @@ BARS = {
 def zoo() -> dict[str, Problem]:
     """Every registered kind of problem, in small variants."""
     bars = {name: Bar(**options) for name, options in BARS.items()}
-    return bars | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[raw]": Block(n=2, parametrization="raw")}
+    follower = Block(nx=1, ny=1, nz=2, parametrization="raw", derivatives="hand", load="follower", cases=2)
+    return bars | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower}
+
+
+def options_of(route: Route, problem: Problem) -> list[dict[str, Any]]:
+    """Those of OPTIONS that run on the problem, but for CG inside Newton steps, which test_unrolled has."""
+    able = [options for options in OPTIONS.get(route.name, [{}]) if route.objection(problem, **options) is None]
+    return [options for options in able if problem.linear or options.get("inner") != "cg"]
 
 
 def somewhere(problem: Problem, seed: int = 0) -> Array:
@@ -81,6 +91,14 @@ class Ran:
     def rows(self) -> list[dict[str, Any]]:
         """One JSON object a line, nothing else: anything else fails here."""
         return [json.loads(line, parse_constant=lambda c: pytest.fail(c)) for line in self.out.splitlines()]
+
+
+@pytest.fixture(autouse=True)
+def garbage_of_this_test_only() -> Iterator[None]:
+    """Measurements collect garbage first: through all that JAX compiled for earlier tests that would take seconds."""
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture

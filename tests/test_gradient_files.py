@@ -38,7 +38,7 @@ def test_gradients_are_written_parameter_by_parameter(cli) -> None:
     np.testing.assert_allclose(bar.reference, bar.dJ_dp, rtol=1e-12)
     block = table[(table.problem == "block[n=2]") & (table.route == "fd-central")]
     problem = Block(n=2)
-    np.testing.assert_array_equal(block[["x", "y", "z"]], problem.centres.T)
+    np.testing.assert_array_equal(block[["x", "y", "z"]], problem.parameters.position)
     np.testing.assert_array_equal(block.p, problem.parameters.start)
     assert list(block.parameter) == [f"log E_{e}" for e in range(1, 9)]
     assert set(block.unit) == {"log Pa"}
@@ -58,7 +58,7 @@ def test_components_keep_their_names_and_places(cli) -> None:
     assert ran.code == 0
     table, problem = pd.read_csv("g.csv"), Block(n=2)
     e = table.parameter.str.removeprefix("log E_").astype(int) - 1
-    np.testing.assert_array_equal(table[["x", "y", "z"]], problem.centres.T[e])
+    np.testing.assert_array_equal(table[["x", "y", "z"]], problem.parameters.position[e])
     np.testing.assert_allclose(table.dJ_dp, table.reference, rtol=1e-9)
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from problems.elements import _second_derivative, gradient
 from problems.errors import InputError
 from problems.jax64 import jax, jnp
 from problems.materials import ALPHA, LAWS, Law, lame
+from problems.solid import _second_derivative, gradient
 from problems.spectral import power_trace
 
 E, NU = 1.7, 0.3

@@ -187,7 +187,7 @@ def test_one_wrong_component_of_500_is_seen(route: Route, wrong: float, componen
     assert 0.2 * wrong < judge.error(g)[0] < 5.0 * wrong
 
 
-@pytest.mark.parametrize("name", ["duffing", "block[n=2]", "block[raw]"])
+@pytest.mark.parametrize("name", ["duffing", "block[n=2]", "block[follower]"])
 @pytest.mark.parametrize("route", [adjoint, complex_step], ids=ids)
 def test_slopes_are_those_of_the_gradient(name: str, route: Route, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(accuracy, "MANY", 0)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from conftest import EXACT, OPTIONS, ROUTES, relative_error, somewhere, zoo
+from conftest import EXACT, OPTIONS, ROUTES, options_of, relative_error, somewhere, zoo
 
 from bench.accuracy import error
 from problems.bar import Bar
@@ -32,9 +32,8 @@ ACCURACY = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "unrolled-ad": 1e-9}
 def pairs(routes: tuple[Route, ...] = ROUTES) -> Iterator[tuple[str, Route, dict]]:
     for name, problem in ZOO.items():
         for route in routes:
-            for options in OPTIONS.get(route.name, [{}]):
-                if route.objection(problem, **options) is None:
-                    yield name, route, options
+            for options in options_of(route, problem):
+                yield name, route, options
 
 
 def ids(value: object) -> str | None:
