@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -90,11 +91,20 @@ class Judges:
             return reason if route.name in reason else f"{route.name}: {reason}"
         if whole:
             gradient = route.prepare(self.model, self.p)(self.p).gradient
-            return self._sound(Reference(route.name, gradient, norm2(gradient)), self.p.shape)
+            sizes = np.maximum(np.abs(self.p), problem.parameters.scale)
+            return self._sound(Reference(route.name, gradient, self._size(gradient, 1.0 / sizes)), self.p.shape)
         few = directions(problem, self.p, DIRECTIONS, SEED)
         slopes = self._slopes(route, few)
         name = f"{route.name} in {DIRECTIONS} random directions"
-        return self._sound(Reference(name, slopes, norm2(slopes)), (DIRECTIONS,), few.V)
+        return self._sound(Reference(name, slopes, self._size(slopes, np.ones(DIRECTIONS))), (DIRECTIONS,), few.V)
+
+    def _size(self, gradient: Array, natural: Array) -> float:
+        """Of the terms: the gradient's, or where that is next to nothing what J changes by where p naturally does."""
+        return max(norm2(gradient), abs(self._J) * norm2(natural))
+
+    @cached_property
+    def _J(self) -> float:
+        return self.model.value(self.p)
 
     def _slopes(self, route: Route, few: Restricted) -> Array:
         solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol))

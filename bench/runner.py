@@ -126,6 +126,7 @@ class Workbench:
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
         self.judges = Judges(self.model(), self.p, self._unaffordable_judge)
+        self._forward_model = self.model()
         self._priced: tuple[Prices, State | None] | Exception | None = None
 
     def _restrict(self, partial: Partial | None) -> str | None:
@@ -278,7 +279,7 @@ class Workbench:
         """Prices and the state they were measured on; a forward solve that fails is not tried again."""
         if self._priced is None:
             try:
-                self._priced = prices(self.model(), self.p)
+                self._priced = prices(self._forward_model, self.p)
             except Exception as failure:  # raised again, for every route
                 self._priced = failure
         if isinstance(self._priced, Exception):
@@ -295,7 +296,7 @@ class Workbench:
         return self.model().value(self.p) if state is None else float(state.J)
 
     def _forward(self) -> Callable[[], Any]:
-        model = self.model()
+        model = self._forward_model  # has analyzed its matrices, as the route's own has by now
         solvable = Offers.SOLVE in self.problem.offers
         return (lambda: model.solve(self.p)) if solvable else (lambda: model.value(self.p))
 
