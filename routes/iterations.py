@@ -66,7 +66,7 @@ def solution(iteration: Iteration, u_0: Any, p: Any, newton: int, k: int, checkp
     def step(u: Any, _: Any) -> Any:
         return u + iteration.iterate((u, p), k, checkpoint), None
 
-    return jax.lax.scan(step, u_0, None, length=newton)[0]
+    return step(u_0, None)[0] if newton == 1 else jax.lax.scan(step, u_0, None, length=newton)[0]
 
 
 def iteration(inner: str, traced: Traced) -> Iteration:

@@ -85,7 +85,7 @@ def expect(
         condition = n_u**2 if condition is None else condition
         cg = min(n_u, math.sqrt(condition) / 2 * math.log(2 / rtol))
         iterations = math.ceil(min(NEVER, cg if inner == "cg" else condition * math.log(1 / rtol)))
-    newton = None if inner == "direct" else newton or steps
+    newton = newton if inner == "direct" or model.problem.linear else newton or steps
     return {"inner": inner, "iterations": iterations, "newton": newton, "checkpoint": checkpoint}
 
 
@@ -106,7 +106,9 @@ def resolve(
     problem, inner = model.problem, chosen(model.problem, inner)
     state = None if problem.linear else model.solve(p)
     steps = 1 if state is None else state.work.newton_iterations
-    options = {"inner": inner, "newton": None if inner == "direct" else newton or steps, "checkpoint": checkpoint}
+    if inner != "direct" and not problem.linear:
+        newton = newton or steps
+    options = {"inner": inner, "newton": newton, "checkpoint": checkpoint}
     if iterations is None and inner == "direct":
         iterations = steps
     elif iterations is None:
@@ -168,8 +170,7 @@ def unrolled_ad(
     assert iterations is not None  # Route.prepare resolves it
     if inner == "direct":
         return through_newton(model, iterations)
-    assert newton is not None
-    return through_iterations(model, p, str(inner), iterations, newton, checkpoint)
+    return through_iterations(model, p, str(inner), iterations, newton or 1, checkpoint)
 
 
 def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, checkpoint: int | None) -> Gradient:

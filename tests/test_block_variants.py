@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import relative_error
+from meshio import Mesh
+from skfem.io.meshio import from_meshio, to_meshio
 
+from bench.studies.sensitivity import slice_of
+from problems import bodies
 from problems.block import Block
+from problems.errors import InputError
 from problems.problem import Array
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
@@ -83,3 +89,164 @@ def near_start(problem: Block) -> Array:
     """Off the start, by a hundredth of what p_i naturally changes by."""
     parameters = problem.parameters
     return parameters.start + 0.01 * parameters.scale * np.random.default_rng(0).uniform(-1, 1, len(parameters))
+
+
+def test_the_picture_shows_the_inclusion_and_a_gradient_that_points_at_it() -> None:
+    slice_ = slice_of(5)
+    inside = slice_.truth > 1.0
+    assert 0 < inside.sum() < inside.size
+    assert (slice_.sensitivity < 0).all()  # stiffer, it says
+    assert slice_.sensitivity[inside].mean() < 1.1 * slice_.sensitivity[~inside].mean()
+    np.testing.assert_allclose(slice_.sensitivity, slice_.sensitivity[:, ::-1], rtol=1e-9)  # as the body
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4", "tet10"])
+def test_mesh_files_give_the_body_they_hold(element: str, tmp_path: Path) -> None:
+    """Written from a box, read back: the same gradient, with the faces the file names."""
+    path, box = str(tmp_path / "box.vtu"), Block(**SMALL, element=element)
+    named = box.body.mesh.with_boundaries({"grip": box.body.mesh.facets_satisfying(lambda x: x[2] == 0.0)})
+    to_meshio(named).write(path)
+    read = Block(mesh=path, clamped="grip", loaded="z=1")
+    assert (read.n_state, len(read.parameters)) == (box.n_state, len(box.parameters))
+    p = box.parameters.start
+    one, other = (adjoint.prepare(Model(block), p)(p) for block in (box, read))
+    assert relative_error(other.gradient, one.gradient) < 1e-11
+    fields = read.fields(p, other.u, other.lam, other.gradient)
+    back = Mesh(fields.points, [(fields.cell_type, fields.cells)])
+    assert from_meshio(back).p.shape == read.body.mesh.p.shape
+
+
+def test_a_patch_of_any_element_is_stretched_evenly() -> None:
+    """nu = 0 and one E: F = diag(1, 1, s) with E/2 (s - 1/s) = t wherever, on every mesh."""
+    s = 0.3 + np.sqrt(0.3**2 + 1.0)
+    for element in ("hex8", "tet4", "tet10"):
+        block = Block(**SMALL, element=element, nu=0.0, traction=0.3, size="1,2,3")
+        u = Model(block).solve(np.zeros(len(block.parameters))).u
+        X = block.body.geometry.X
+        U = block.supports.displacements(u, 0.0, 0, np.arange(len(X)), np)
+        np.testing.assert_allclose(U, X * [0.0, 0.0, s - 1.0], atol=1e-11)
+
+
+def test_a_follower_pressure_has_a_tangent_that_is_not_symmetric() -> None:
+    block = Block(**SMALL, load="follower")
+    u = 0.05 * np.random.default_rng(0).standard_normal(block.n_state)
+    K = block.tangent(u, block.parameters.start).full()
+    assert abs(K - K.T).max() > 1e-3 * abs(K).max()
+
+
+@pytest.mark.parametrize("where", ["top", "right", "z=1"])
+def test_markers_read_what_the_shape_functions_say(where: str) -> None:
+    """A displacement that is affine in X is read exactly at every marker; in-plane leaves the normal out."""
+    for element in ("hex8", "tet4", "tet10"):
+        block = Block(**SMALL, element=element, markers=7, face=where, components="in-plane", seed=3)
+        H = np.array([[0.1, 0.2, 0.3], [0.0, -0.1, 0.4], [0.2, 0.1, 0.5]])
+        U = block.body.geometry.X @ H.T
+        np.testing.assert_allclose(block.probes.read(U[block.probes.nodes]), block.probes.x @ H.T, atol=1e-14)
+        normal = 0 if where == "right" else 2
+        np.testing.assert_allclose(block.probes.x[:, normal], 1.0, atol=1e-14)
+        assert block.probes.seen.sum(axis=0).tolist() == [0 if i == normal else 7 for i in range(3)]
+
+
+def test_measured_points_need_not_be_nodes_nor_whole(tmp_path: Path) -> None:
+    path = tmp_path / "d.csv"
+    path.write_text("x,y,z,ux,uy,uz\n0.3,0.4,1,0.01,,0.2\n1,1,1,,,0.1\n")
+    block = Block(**SMALL, data=str(path))
+    assert block.probes.seen.tolist() == [[True, False, True], [False, False, True]]
+    U = block.body.geometry.X @ np.diag([0.1, 0.2, 0.3])
+    np.testing.assert_allclose(
+        block.probes.read(U[block.probes.nodes]), [[0.03, 0.08, 0.3], [0.1, 0.2, 0.3]], atol=1e-14
+    )
+
+
+def test_synthetic_data_are_what_the_truth_would_show() -> None:
+    """At the truth the misfit is the noise; another seed draws other noise; before they are made J says what to do."""
+    options = SMALL | {"data": "twin", "markers": 20, "noise": 1e-3}
+    with pytest.raises(InputError, match="with_synthetic_data"):
+        Model(Block(**options)).solve(Block(**options).parameters.start)
+    one, other = (with_synthetic_data(Block(**options, seed=seed)) for seed in (0, 1))
+    J = Model(one).value(one.truth())
+    assert J == pytest.approx(0.5 * 60 * 1e-6, rel=0.5)  # chi squared of 60 numbers: rel. 0.18 a standard deviation
+    assert J != Model(other).value(other.truth())
+    exact = with_synthetic_data(Block(**options | {"noise": 0.0}))
+    assert Model(exact).value(exact.truth()) < 1e-24
+
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"nx": 0}, "nx=0"),
+    ({"size": "1,2"}, "size=1,2"),
+    ({"size": "0"}, "size=0"),
+    ({"size": "a"}, "size=a"),
+    ({"clamped": "none"}, "free to turn"),
+    ({"clamped": "nowhere"}, "no boundary 'nowhere'"),
+    ({"loaded": "z=7"}, "no facet"),
+    ({"mesh": "nowhere.msh"}, "no such file"),
+    ({"law": "mooney-rivlin", "nu": 0.1}, "c = "),
+    ({"derivatives": "hand", "law": "ogden"}, "not ogden"),
+    ({"derivatives": "hand", "unknown": "shape"}, "not by shape"),
+    ({"unknown": "traction", "load": "follower"}, "one case of load=traction"),
+    ({"unknown": "shape", "surface": "top"}, "choose a free surface"),
+    ({"unknown": "layers", "layers": 9}, "choose fewer"),
+    ({"unknown": "load", "parametrization": "raw"}, "leave it out"),
+    ({"cases": 4}, "cases=4"),
+    ({"markers": -1}, "markers=-1"),
+    ({"noise": 0.1}, "data=twin"),
+    ({"data": "nowhere.csv"}, "No such file"),
+]
+
+
+@pytest.mark.parametrize(("options", "says"), BAD, ids=[says for _, says in BAD])
+def test_bad_options_of_any_block_are_one_line(options: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Block(**SMALL | options)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert " - " in str(caught.value), "an error says what to do"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x,y,z,ux,uy,uz\n500,500,1000,0,0,1\n", "row 1 at (500, 500, 1000) lies outside"),
+        ("x,y,z,u\n0,0,1,0\n", "no column ux, uy, uz"),
+        ("x,y,z,ux,uy,uz\n0,0,1,,,\n", "measures nothing"),
+        ("x,y,z,ux,uy,uz\n0,,1,0,0,0\n", "column y: '' is not a number"),
+        ("x,y,z,ux,uy,uz\n0,0,1,0,0,nan\n", "nan is not finite"),
+    ],
+)
+def test_bad_data_files_say_where(text: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "d.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        Block(**SMALL, data=str(path))
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_data_a_thousand_times_off_are_warned_of(tmp_path: Path) -> None:
+    path = tmp_path / "d.csv"
+    path.write_text("x,y,z,ux,uy,uz\n0.5,0.5,1,0,0,200\n")
+    assert "units right?" in Block(**SMALL, data=str(path)).notes[0]
+    assert "zero load" in Block(**SMALL, traction=0.0).notes[0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "cells", "moved", "says"),
+    [
+        ("triangle", [[0, 1, 2]], None, "has triangle"),
+        ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], None, ""),
+        ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [0.1, 0.1, 0.1], "folded over a neighbour"),
+        ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [1 / 3, 1 / 3, 1 / 3], "flat, inside out"),
+    ],
+)
+def test_meshes_that_are_none_are_refused(
+    kind: str, cells: list, moved: list | None, says: str, tmp_path: Path
+) -> None:
+    X = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], dtype=float)
+    X[4] = X[4] if moved is None else moved
+    path = tmp_path / "mesh.vtu"
+    Mesh(X, [(kind, np.array(cells))]).write(path)
+    if says:
+        with pytest.raises(InputError, match=says):
+            bodies.read("block", path)
+    else:
+        assert bodies.read("block", path).geometry.metric[1].sum() == pytest.approx(0.5)
