@@ -1,4 +1,4 @@
-"""The block's residual, tangent and R_p from hand-derived P, A and dP/dq, in NumPy: JAX takes no part."""
+"""A solid's residual, tangent and R_p from hand-derived P, A and dP/dq, in NumPy: JAX takes no part."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ import numpy as np
 from problems.problem import Array
 
 if TYPE_CHECKING:
-    from problems.block import Block
+    from problems.mechanics import Mechanics
 
 
 class HandSolid:
     """What `derivatives=hand` computes with; f_int = sum over points of P dN dx."""
 
-    def __init__(self, block: Block) -> None:
-        assert block.law.hand is not None, "the block refuses laws without"
-        self.block, self.hand = block, block.law.hand
-        self.nodes = block.body.geometry.nodes
+    def __init__(self, mechanics: Mechanics) -> None:
+        assert mechanics.law.hand is not None, "the block refuses laws without"
+        self.mechanics, self.hand = mechanics, mechanics.law.hand
+        self.nodes = mechanics.body.geometry.nodes
 
     def residual(self, u: Array, p: Array) -> Array:
         """f_int - f_ext, (n_u,)."""
-        block = self.block
-        s = block.setting(p)
-        dN, dx = block.metric(s, np)
+        m = self.mechanics
+        s = m.setting(p)
+        dN, dx = m.metric(s, np)
         parts = []
-        for case in range(len(block.directions)):
-            F = self._F(block.displacements(u, s, case, self.nodes), dN)
+        for case in range(len(m.directions)):
+            F = self._F(m.displacements(u, s, case, self.nodes), dN)
             f_e = _forces(self.hand.P(F, _per_point(s.q, F)), dN, dx)
-            f, _ = block.supports.gather(f_e, self.nodes, case)
-            if block.load_kind == "traction":
-                f = f - block.supports.gather(block.dead_forces(s, case, np), block.loaded.nodes, case)[0]
-            elif block.load_kind == "follower":
-                u_f = block.displacements(u, s, case, block.loaded.nodes)
-                f = f - block.supports.gather(block.follower_forces(u_f, s, case, np), block.loaded.nodes, case)[0]
+            f, _ = m.supports.gather(f_e, self.nodes, case)
+            if m.load == "traction":
+                f = f - m.supports.gather(m.dead_forces(s, case, np), m.loaded.nodes, case)[0]
+            elif m.load == "follower":
+                u_f = m.displacements(u, s, case, m.loaded.nodes)
+                f = f - m.supports.gather(m.follower_forces(u_f, s, case, np), m.loaded.nodes, case)[0]
             parts.append(f)
         return np.concatenate(parts)
 
@@ -50,23 +50,23 @@ class HandSolid:
         """R_p (n_u, n_p), a sparse matrix: every cell depends on one parameter through each constant."""
         from scipy.sparse import coo_array
 
-        block, assert_q_p = self.block, self.block.unknown.q_p
-        assert assert_q_p is not None, "the block refuses other unknowns"
-        s = block.setting(p)
-        dN, dx = block.metric(s, np)
+        m, derivative = self.mechanics, self.mechanics.unknown.q_p
+        assert derivative is not None, "the block refuses other unknowns"
+        s = m.setting(p)
+        dN, dx = m.metric(s, np)
         rows, columns, entries = [], [], []
-        for case in range(len(block.directions)):
-            F = self._F(block.displacements(u, s, case, self.nodes), dN)
-            unknowns = block.supports.unknowns(self.nodes, case)
+        for case in range(len(m.directions)):
+            F = self._F(m.displacements(u, s, case, self.nodes), dN)
+            unknowns = m.supports.unknowns(self.nodes, case)
             free = unknowns >= 0
-            for P_q, (q_p, column) in zip(self.hand.P_q(F, _per_point(s.q, F)), assert_q_p(p), strict=True):
+            for P_q, (q_p, column) in zip(self.hand.P_q(F, _per_point(s.q, F)), derivative(p), strict=True):
                 f_e = _forces(P_q, dN, dx).reshape(unknowns.shape) * q_p[:, None]
-                rows.append(case * block.supports.n_free + unknowns[free])
+                rows.append(case * m.supports.n_free + unknowns[free])
                 columns.append(np.broadcast_to(column[:, None], unknowns.shape)[free])
                 entries.append(f_e[free])
         ijv = (np.concatenate(part) for part in (entries, rows, columns))
         data, i, j = ijv
-        return coo_array((data, (i, j)), shape=(block.n_state, len(p))).tocsr()
+        return coo_array((data, (i, j)), shape=(m.supports.n_u, len(p))).tocsr()
 
     @staticmethod
     def _F(u_e: Array, dN: Array) -> Array:

@@ -18,10 +18,13 @@ class Supports:
 
     n_free                         unknowns of a case
     index (cases, n_nodes, 3)      where a nodal displacement stands in (u_case, 0, a), a the grip's amplitude [m]
+    clamped, gripped               numbers of the nodes held and of those moved
     """
 
     n_free: int
     index: Array
+    clamped: Array
+    gripped: Array
 
     @classmethod
     def of(cls, body: Body, clamped: Array, gripped: Array, directions: Array) -> Supports:
@@ -38,7 +41,7 @@ class Supports:
         cases = np.repeat(index[None], len(directions), axis=0)
         for case, direction in zip(cases, directions, strict=True):
             case[gripped[:, None], np.flatnonzero(direction)] = n_free + 1
-        return cls(n_free, cases)
+        return cls(n_free, cases, clamped, gripped)
 
     @property
     def n_u(self) -> int:

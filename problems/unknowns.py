@@ -44,6 +44,7 @@ class Unknown:
             parameter's number, (n_e,) both; None where p is no material
     group   (n_e,), the number of each cell's modulus, where p are moduli
     nodes   numbers of the nodes whose positions p are, where they are
+    is_load p is the load's amplitude
     """
 
     parameters: Parameters
@@ -52,6 +53,7 @@ class Unknown:
     q_p: Callable[[Array], list[tuple[Array, Array]]] | None = None
     group: Array | None = None
     nodes: Array | None = None
+    is_load: bool = False
 
 
 def default_modulus(x: Array) -> Array:
@@ -182,4 +184,4 @@ def amplitude(name: str, start: float, unit: str) -> Unknown:
     parameters = Parameters(
         start=np.array([start]), scale=np.array([abs(start) or 1.0]), unit=unit, label=lambda i: name
     )
-    return Unknown(parameters, lambda s, p, xp: replace(s, load=p[0]), np.array([1.25 * start]))
+    return Unknown(parameters, lambda s, p, xp: replace(s, load=p[0]), np.array([1.25 * start]), is_load=True)

@@ -19,7 +19,7 @@ from routes.route import Route
 
 def top(block: Block, u: np.ndarray) -> np.ndarray:
     """Displacements of the nodes on the top, (m, 3)."""
-    return block.supports.displacements(u, 0.0, 0, block.loaded.node_set, np)
+    return block.mechanics.supports.displacements(u, 0.0, 0, block.mechanics.loaded.node_set, np)
 
 
 DATA = Path(__file__).parent / "data"

@@ -123,7 +123,7 @@ def test_a_patch_of_any_element_is_stretched_evenly() -> None:
         block = Block(**SMALL, element=element, nu=0.0, traction=0.3, size="1,2,3")
         u = Model(block).solve(np.zeros(len(block.parameters))).u
         X = block.body.geometry.X
-        U = block.supports.displacements(u, 0.0, 0, np.arange(len(X)), np)
+        U = block.mechanics.supports.displacements(u, 0.0, 0, np.arange(len(X)), np)
         np.testing.assert_allclose(U, X * [0.0, 0.0, s - 1.0], atol=1e-11)
 
 
