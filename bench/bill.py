@@ -28,11 +28,15 @@ class Prices:
     declared: ForwardWork
 
     def seconds(self, work: Work) -> float:
-        """The bill; substitutions inside forward solves are already in their price."""
-        inside = work.forward_solves * self.declared.cold.matvecs  # products of inexact steps, a substitution each
-        products = max(0, work.matvecs - inside)
-        substitutions = work.solves + work.transposed_solves - work.newton_iterations - (work.matvecs - products)
-        return work.forward_solves * self.forward + substitutions * self.solve + products * self.matvec
+        """The bill: cold forward solves' worth of factorizations, and what substitutions and products are left over.
+
+        A residual costs what a product does. Chord steps on factors at hand are so no forward solves.
+        """
+        cold = self.declared.cold
+        times = work.factorizations / cold.factorizations if cold.factorizations else work.forward_solves
+        substitutions = work.solves + work.transposed_solves - times * cold.solves
+        products = work.matvecs + work.residuals - times * (cold.matvecs + cold.residuals)
+        return times * self.forward + max(0.0, substitutions) * self.solve + max(0.0, products) * self.matvec
 
 
 def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
