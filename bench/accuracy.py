@@ -11,7 +11,7 @@ import numpy as np
 from bench import registry
 from bench.slopes import complex_slopes
 from problems.errors import RoutesError
-from problems.problem import Array, Operator, Reference
+from problems.problem import Array, Offers, Operator, Reference
 from problems.restricted import Restricted, directions
 from routes.model import Model
 from routes.route import Route
@@ -19,6 +19,8 @@ from routes.route import Route
 JUDGES = ("complex-step", "tangent")  # where a problem knows no closed form; never the judged route itself
 MANY = 200  # parameters; beyond, these judge in random directions: the whole costs too much to be run unasked
 DIRECTIONS, SEED = 3, 20260  # no direction a user's --seed would name
+SAME = 1e-6  # of J: no tolerance of a forward solve, another state
+CANCELLED = 1e3  # eps, what condition numbers make of rounding in the terms of a gradient
 RTOL = 1e-13  # forward solves of judges in directions
 
 
@@ -90,7 +92,9 @@ class Judges:
         if reason is not None:
             return reason if route.name in reason else f"{route.name}: {reason}"
         if whole:
-            gradient = route.prepare(self.model, self.p)(self.p).gradient
+            J, gradient, *_ = route.prepare(self.model, self.p)(self.p)
+            if self._another_state(J):
+                return f"{route.name}: has found another state, J = {J:.6g} and not {self._J:.6g}"
             sizes = np.maximum(np.abs(self.p), problem.parameters.scale)
             return self._sound(Reference(route.name, gradient, self._size(gradient, 1.0 / sizes)), self.p.shape)
         few = directions(problem, self.p, DIRECTIONS, SEED)
@@ -100,11 +104,22 @@ class Judges:
 
     def _size(self, gradient: Array, natural: Array) -> float:
         """Of the terms: the gradient's, or where that is next to nothing what J changes by where p naturally does."""
-        return max(norm2(gradient), abs(self._J) * norm2(natural))
+        return max(norm2(gradient), self._terms * norm2(natural))
+
+    @cached_property
+    def _terms(self) -> float:
+        """What J is made of: near its minimum far less of that is left than at the state solves start from."""
+        problem = self.model.problem
+        before = problem.objective(problem.initial(self.p), self.p) if Offers.SOLVE in problem.offers else 0.0
+        return max(abs(self._J), abs(float(before)))
 
     @cached_property
     def _J(self) -> float:
         return self.model.value(self.p)
+
+    def _another_state(self, J: float | None) -> bool:
+        """Whether a judge's J is not the J of real solves: where R(u, p) = 0 has several solutions it may be."""
+        return J is not None and abs(J - self._J) > SAME * self._terms
 
     def _slopes(self, route: Route, few: Restricted) -> Array:
         solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol))
@@ -133,7 +148,7 @@ def error(gradient: Array, reference: Reference) -> tuple[float, str]:
     the name says so.
     """
     difference, scale = norm2(gradient - reference.gradient), norm2(reference.gradient)
-    rounding = 8.0 * np.finfo(np.float64).eps * np.sqrt(len(gradient)) * reference.size
+    rounding = CANCELLED * np.finfo(np.float64).eps * np.sqrt(len(gradient)) * reference.size
     if scale > rounding:
         return difference / scale, reference.name
     relative = difference / reference.size if reference.size else (0.0 if difference == 0.0 else np.inf)

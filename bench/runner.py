@@ -26,6 +26,7 @@ from routes.newton import Solver, State
 from routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
+SMALL = 1e-6  # relative residual of a state that deserves to be called converged
 WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
 
@@ -125,7 +126,8 @@ class Workbench:
             raise InputError(f"{self.problem.name}: has no mesh to write fields on - drop --vtu")
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
-        self.judges = Judges(self.model(), self.p, self._unaffordable_judge)
+        direct = replace(settings.solver, linear_solver="auto", newton="full")  # a judge is no fellow of the judged
+        self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_judge)
         self._forward_model = self.model()
         self._priced: tuple[Prices, State | None] | Exception | None = None
 
@@ -219,7 +221,8 @@ class Workbench:
             _note(row, f"{route.name}: counted work differs from the declared")
         self._judge(route, result, row)
         if row["tape_bytes"] is not None and options.get("iterations"):
-            row["tape_bytes_per_iteration"] = row["tape_bytes"] / options["iterations"]
+            iterations = options["iterations"] * (options.get("newton") or 1)
+            row["tape_bytes_per_iteration"] = None if options.get("checkpoint") else row["tape_bytes"] / iterations
         self._note_factors(row)
         samples, peak = steady(lambda: gradient(self.p), self._forward(), row["first_s"], self.settings.min_time)
         row["peak_bytes"], row["memory_method"] = peak
@@ -238,7 +241,7 @@ class Workbench:
         if state is not None:
             row["linear_solver"] = state.factors.name
             if self.problem.structure == "spd" and "L D L^T" in state.factors.name:
-                _note(row, "R_u is not positive definite at u: factorized as L D L^T (a buckled state?)")
+                _note(row, "R_u is not positive definite at u: factorized as L D L^T (an unstable state, buckled say)")
 
     def _judge(self, route: Route, result: Result, row: Row) -> None:
         """Fill in J, the gradient and its error; raise Failure for numbers that are none."""
@@ -271,7 +274,7 @@ class Workbench:
             _note(row, f"{route.name}: error unknown, nobody judges: {judge}")
             return
         row["gradient_error"], row["reference"] = judge.error(g)
-        converged = row["residual"] is not None and row["residual"] <= 10.0 * self.settings.solver.rtol
+        converged = row["residual"] is not None and row["residual"] <= min(10.0 * self.settings.solver.rtol, SMALL)
         if converged and row["gradient_error"] > WRONG:
             _note(row, f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
 

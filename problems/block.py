@@ -22,6 +22,8 @@ LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
 DIRECTIONS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # of load case 1, 2, 3
 ACROSS = 0.25  # of the traction: pushed sideways a block bends, and far
 TARGET = 0.2  # of the body's height: how far the top should go, where nobody has measured
+MOST = 10**7  # cells, markers, layers: more fit in no memory
+NEARLY_INCOMPRESSIBLE = 0.495
 MATERIAL: tuple[UnknownName, ...] = ("modulus", "layers", "constants")
 
 
@@ -34,6 +36,7 @@ class Block(Problem):
 
     name = "block"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
+    load_steps = True
 
     def __init__(
         self,
@@ -67,6 +70,17 @@ class Block(Problem):
         seed: Annotated[int, "of noise and markers"] = 0,
     ) -> None:
         _check_counts(n=n, nx=nx, ny=ny, nz=nz, layers=layers, cases=cases, markers=markers, seed=seed)
+        _check_applies(
+            ("mesh", mesh is not None, False, {"n": n != 4, "nx": nx, "ny": ny, "nz": nz, "size": size != "1"}),
+            ("mesh", mesh is not None, False, {"element": element != "hex8"}),
+            ("markers", markers > 0, True, {"face": face != "right", "components": components != "all"}),
+            ("markers", markers > 0, False, {"sensors": sensors}),
+            ("data=FILE", data not in (None, "twin"), False, {"sensors": sensors, "markers": markers}),
+            ("unknown=layers", unknown == "layers", True, {"layers": layers != 4}),
+            ("unknown=shape", unknown == "shape", True, {"surface": surface != "right"}),
+            ("load=displacement", load == "displacement", True, {"displacement": displacement != 0.2}),
+            ("load=displacement", load == "displacement", False, {"traction": traction != 0.2}),
+        )
         _check_numbers(nu, traction, displacement, noise, data)
         _check_unknown(unknown, load, cases, parametrization, derivatives)
         from problems.materials import LAWS
@@ -76,10 +90,16 @@ class Block(Problem):
             raise InputError(f"block: derivatives=hand exist for neo-hookean and mooney-rivlin, not {law} - take ad")
         chosen.check(chosen.of_modulus(1.0, nu))
         cells = nx or n, ny or n, nz or n
+        if math.prod(cells) > MOST or markers > MOST or layers > MOST:
+            raise InputError(
+                f"block: {max(math.prod(cells), markers, layers):g} cells, markers or layers - at most {MOST:g}"
+            )
         self.body = bodies.read("block", mesh) if mesh else bodies.box("block", element, cells, _lengths(size))
         body, top = self.body, self.body.surface(loaded)
         clamp = body.surface(clamped).node_set if clamped != "none" else np.zeros(0, dtype=int)
         check_clamp(body, clamp)
+        if not np.setdiff1d(top.node_set, clamp).size:
+            raise InputError(f"block: loaded={loaded}: all its nodes are clamped - choose another face")
         grip = np.setdiff1d(top.node_set, clamp) if load == "displacement" else np.zeros(0, dtype=int)
         directions = DIRECTIONS[:cases] * (np.array([[1.0], [ACROSS], [ACROSS]])[:cases] if load == "traction" else 1.0)
         self.log, blank = parametrization != "raw", data == "twin"
@@ -100,16 +120,16 @@ class Block(Problem):
         self.n_state = supports.n_u
         self.linear = law == "linear" and load != "follower"
         self.structure = "spd" if self.mechanics.symmetric else "general"
-        self.offset = float(np.abs(body.box).max())  # positions are what displacements are added to
+        self.offset = float(np.ptp(body.box, axis=0).max())  # grad u is added to 1, u to nothing larger than the body
         self.matrix_free = not by_hand
         self.noise, self.seed, self.twin_data = noise, seed, data == "twin"
-        if amplitude == 0.0 and unknown != "load":
+        if nu > NEARLY_INCOMPRESSIBLE:
+            self.notes += (f"nu={nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
+        if amplitude == 0.0 and unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if data is not None and data != "twin":
-            if markers or sensors is not None or cases > 1:
-                raise InputError(
-                    "block: data=FILE holds its own points and one load case - leave out sensors, markers, cases"
-                )
+            if cases > 1:
+                raise InputError(f"block: data=FILE with cases={cases} - it holds one load case, leave cases out")
             self._measured(data)
         elif markers:
             self._unmeasured(probes.markers(body, face, markers, components == "in-plane", seed))
@@ -117,6 +137,8 @@ class Block(Problem):
             where = "right" if load == "displacement" and sensors is None else sensors
             facets = top if where is None else body.surface(where)
             self._unmeasured(probes.at_nodes(body, facets.node_set))
+        if not (supports.index[:, self.probes.nodes] != supports.n_free).any():
+            raise InputError("block: all sensors sit on clamped nodes and read zero - choose other points")
 
     def _measured(self, path: str) -> None:
         """S and d (1, m, 3) from a file."""
@@ -130,16 +152,16 @@ class Block(Problem):
         """S, and d (cases, m, 3) where the target is one; None for a twin whose state is still to be solved for."""
         self.probes = points
         height = TARGET * (points.x[:, 2] - self.body.box[0, 2])
-        target = height[None, :, None] * self.mechanics.directions[:, None]
+        directions = self.mechanics.directions
+        if self.mechanics.load == "follower":  # along the normal in every case, only less
+            directions = directions[:1] / (1.0 + np.arange(len(directions)))[:, None]
+        target = height[None, :, None] * directions[:, None]
         self.d = None if self.twin_data else target
 
     # --- the contract
 
     def initial(self, p: Array) -> Array:
         return self.mechanics.initial(p)
-
-    def load(self, p: Array) -> Array:
-        return -self.residual(self.initial(p), p)
 
     def residual(self, u: Array, p: Array) -> Array:
         return self.mechanics.residual(u, p)
@@ -233,8 +255,17 @@ def _check_counts(**counts: int | None) -> None:
         raise InputError(f"block: cases={counts['cases']} - there are 1 to {len(DIRECTIONS)}: along z, x, y")
 
 
+def _check_applies(*rules: tuple[str, bool, bool, dict[str, Any]]) -> None:
+    """Options that would be ignored: (condition, whether it holds, whether the options need it, whether given)."""
+    for condition, holds, needed, options in rules:
+        given = [name for name, value in options.items() if value]
+        if given and holds != needed:
+            verb = "needs" if needed else "does not go with"
+            raise InputError(f"block: {given[0]} {verb} {condition} - leave {given[0]} out or change {condition}")
+
+
 def _check_numbers(nu: float, traction: float, displacement: float, noise: float, data: str | None) -> None:
-    if not -1.0 < nu < 0.5:
+    if not -1.0 < nu < 0.5 - 1e-9:
         raise InputError(f"block: nu={nu:g} - the laws are compressible, choose -1 < nu < 0.5")
     if not (math.isfinite(traction) and math.isfinite(displacement)):
         raise InputError(f"block: traction={traction:g}, displacement={displacement:g} - choose finite ones")
@@ -261,6 +292,6 @@ def _lengths(size: str) -> tuple[float, float, float]:
         lengths = []
     if len(lengths) == 1:
         lengths *= 3
-    if len(lengths) != 3 or not all(0 < L < math.inf for L in lengths):
-        raise InputError(f"block: size={size} - give one length or three, such as 1,2,0.5, all > 0")
+    if len(lengths) != 3 or not all(1e-9 <= L <= 1e9 for L in lengths):
+        raise InputError(f"block: size={size} - give one length or three, such as 1,2,0.5, from 1e-9 to 1e9 m")
     return lengths[0], lengths[1], lengths[2]

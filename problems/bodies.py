@@ -19,6 +19,7 @@ SIDES = {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 1), "bott
 AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-6  # of the body's size: how near a facet must be
 READABLE: dict[str, ElementName] = {"hexahedron": "hex8", "tetra": "tet4", "tetra10": "tet10"}  # meshio's names
+FLAT = ("vertex", "line", "triangle", "quad")  # cells without volume: faces and what bounds them
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +103,15 @@ def read(who: str, path: str | Path) -> Body:
         with redirect_stdout(said_aside), redirect_stderr(said_aside):
             found = meshio.read(path)
     except (Exception, SystemExit) as error:  # readers of many formats, each with errors of its own
-        said = " ".join((said_aside.getvalue() or str(error) or type(error).__name__).split())
+        said = " ".join(f"{said_aside.getvalue()} {error}".split()) or f"{type(error).__name__}, a broken file?"
         raise InputError(f"{who}: mesh={path} cannot be read ({said}) - give a format meshio knows") from None
-    kinds = [kind for kind in READABLE if kind in found.cells_dict]
-    if len(kinds) != 1:
+    kinds = [kind for kind in found.cells_dict if not kind.startswith(FLAT)]
+    if len(kinds) != 1 or kinds[0] not in READABLE:
         has = ", ".join(found.cells_dict) or "no cells"
         raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(READABLE)}")
+    cells = found.cells_dict[kinds[0]]
+    if cells.min() < 0 or cells.max() >= len(found.points):
+        raise InputError(f"{who}: mesh={path} has cells of points beyond its {len(found.points)} - mend the file")
     if np.shape(found.points)[1:] != (3,):
         raise InputError(
             f"{who}: mesh={path} has points of {np.shape(found.points)[-1]} coordinates - it needs x, y, z"

@@ -138,6 +138,20 @@ class Geometry:
         """(n_e, 3) [m], the means of the cells' nodes."""
         return np.asarray(self.X[self.nodes].mean(axis=1))
 
+    @cached_property
+    def parts(self) -> Array:
+        """(n_nodes,), the number of the part each node hangs together with; -1 for nodes of no cell."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.X)
+        a, b = np.repeat(self.nodes[:, 0], self.nodes.shape[1] - 1), self.nodes[:, 1:].ravel()
+        used = np.unique(self.nodes)
+        labels = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
+        parts = np.full(n, -1)
+        parts[used] = np.unique(labels[used], return_inverse=True)[1]
+        return parts
+
     def for_meshio(self) -> tuple[str, Array]:
         """meshio's name of the cells and their nodes (n_e, n_a) in its order, all the right way round."""
         name, positive, negative = MESHIO[self.element.name]
@@ -145,21 +159,32 @@ class Geometry:
 
     def locate(self, x: Array) -> tuple[Array, Array, Array]:
         """The cell (m,) and the reference point (m, 3) of points x (m, 3), and how far outside it lies (m,)."""
-        from scipy.spatial import cKDTree
+        X = self.X[self.nodes]
+        low, high = X.min(axis=1), X.max(axis=1)
+        margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # curved sides bulge
+        found = [
+            self._locate(x_i, X, np.flatnonzero(((low - margin <= x_i) & (x_i <= high + margin)).all(axis=1)))
+            for x_i in x
+        ]
+        cells, xi, outside = zip(*found, strict=True)
+        return np.array(cells), np.array(xi), np.array(outside)
 
-        k = min(len(self.nodes), 24)
-        cells = cKDTree(self.centres).query(x, k)[1].reshape(len(x), k)
-        X, xi = self.X[self.nodes[cells]], np.full((*cells.shape, 3), 0.25)
-        for _ in range(12):  # Newton's method for x = sum_a N_a(xi) X_a
-            N, dN = self.element.shape_functions(np.moveaxis(xi, -1, 0))
-            r = np.einsum("mka,mkai->mki", N, X) - x[:, None]
-            cof, det = cofactors(np.einsum("mkai,mkaj->mkij", X, dN), np)
-            xi = xi - np.einsum("mkij,mki->mkj", cof, r) / det[..., None]
-            xi = np.clip(xi, -4.0, 5.0)  # far outside, the map may fold
-        outside = self.element.outside(xi)
-        best = outside.argmin(axis=1)
-        at = np.arange(len(x)), best
-        return cells[at], xi[at], outside[at]
+    def _locate(self, x: Array, X: Array, cells: Array) -> tuple[int, Array, float]:
+        """The same of one point among `cells`, by Newton's method for x = sum_a N_a(xi) X_a in each."""
+        if not cells.size:  # far outside: by how much is told by the nearest
+            cells = np.array([np.linalg.norm(self.centres - x, axis=1).argmin()])
+        X, xi = X[cells], np.full((len(cells), 3), 0.25)
+        for _ in range(20):
+            N, dN = self.element.shape_functions(xi.T)
+            r = np.einsum("ka,kai->ki", N, X) - x
+            cof, det = cofactors(np.einsum("kai,kaj->kij", X, dN), np)
+            xi = np.clip(
+                xi - np.einsum("kij,ki->kj", cof, r) / det[:, None], -4.0, 5.0
+            )  # far outside, the map may fold
+        reached = np.abs(r).max(axis=1) <= 1e-9 * np.ptp(X, axis=1).max(axis=1)
+        outside = np.where(reached, self.element.outside(xi), np.inf)
+        best = int(outside.argmin())
+        return int(cells[best]), xi[best], float(outside[best])
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,14 +206,15 @@ class Facets:
     @classmethod
     def of(cls, geometry: Geometry, cells: Array, sides: Array) -> Facets:
         s, w = geometry.element.quadrature(facets=True)
+        kinds, which = np.unique(sides, return_inverse=True)
         N, dN, n_ref = [], [], []
-        for side in sides:
+        for side in kinds:
             xi, normal = geometry.element.on_side(int(side), s)
             values, derivatives = geometry.element.shape_functions(xi)
             N.append(values)
             dN.append(derivatives)
             n_ref.append(normal * w[:, None])
-        return cls(geometry, cells, sides, np.stack(N), np.stack(dN), np.stack(n_ref))
+        return cls(geometry, cells, sides, np.stack(N)[which], np.stack(dN)[which], np.stack(n_ref)[which])
 
     @property
     def nodes(self) -> Array:

@@ -75,6 +75,7 @@ def J_and_G(F: Array) -> tuple[Array, Array]:
     a, b = F[NEXT], F[LAST]
     cof = a[:, NEXT] * b[:, LAST] - a[:, LAST] * b[:, NEXT]
     J = (F[0] * cof[0]).sum(axis=0)
+    J = np.where(J.real > 0.0, J, np.nan)  # inside out: no energy, no forces
     return J, cof / J
 
 

@@ -30,12 +30,8 @@ class HandSolid:
             F = self._F(m.displacements(u, s, case, self.nodes), dN)
             f_e = _forces(self.hand.P(F, _per_point(s.q, F)), dN, dx)
             f, _ = m.supports.gather(f_e, self.nodes, case)
-            if m.load == "traction":
-                f = f - m.supports.gather(m.dead_forces(s, case, np), m.loaded.nodes, case)[0]
-            elif m.load == "follower":
-                u_f = m.displacements(u, s, case, m.loaded.nodes)
-                f = f - m.supports.gather(m.follower_forces(u_f, s, case, np), m.loaded.nodes, case)[0]
-            parts.append(f)
+            external = m.external_forces(u, s, case)
+            parts.append(f if external is None else f - m.supports.gather(external, m.loaded.nodes, case)[0])
         return np.concatenate(parts)
 
     def tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, pick: Array) -> Array:

@@ -33,6 +33,14 @@ def det(F: Any) -> Any:
     )
 
 
+def log(J: Any) -> Any:
+    """ln J, it and its derivative not a number where J is not positive: an element inside out bears nothing.
+
+    The derivative 1/J alone would not tell, nor would ln J of complex J.
+    """
+    return jnp.log(J) + jnp.where(jnp.real(J) > 0.0, 0.0, jnp.nan) * J
+
+
 def lame(E: Any, nu: float) -> tuple[Any, Any]:
     """mu, lam [Pa] from Young's modulus and Poisson's ratio."""
     return E / (2.0 * (1.0 + nu)), E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
@@ -41,7 +49,7 @@ def lame(E: Any, nu: float) -> tuple[Any, Any]:
 def neo_hookean(F: Any, q: Any) -> Any:
     """W = mu/2 (tr F^T F - 3) - mu ln det F + lam/2 (ln det F)^2, q = (mu, lam) [Pa] (Bonet & Wood 2008, eq. 6.27)."""
     mu, lam = q
-    ln_J = jnp.log(det(F))
+    ln_J = log(det(F))
     return mu / 2.0 * ((F * F).sum() - 3.0) - mu * ln_J + lam / 2.0 * ln_J**2
 
 
@@ -58,12 +66,12 @@ def mooney_rivlin(F: Any, q: Any) -> Any:
     c1, c2, c = q
     J, cof = det(F), cofactor(F)
     I1, I2 = (F * F).sum(), (cof * cof).sum()
-    return c * (J - 1.0) ** 2 - 2.0 * (c1 + 2.0 * c2) * jnp.log(J) + c1 * (I1 - 3.0) + c2 * (I2 - 3.0)
+    return c * (J - 1.0) ** 2 - 2.0 * (c1 + 2.0 * c2) * log(J) + c1 * (I1 - 3.0) + c2 * (I2 - 3.0)
 
 
 def volumetric(J: Any, kappa: Any) -> Any:
     """kappa/4 (J^2 - 1 - 2 ln J) (Simo & Taylor 1991): infinite at J = 0 and at infinity, convex."""
-    return kappa / 4.0 * (J**2 - 1.0 - 2.0 * jnp.log(J))
+    return kappa / 4.0 * (J**2 - 1.0 - 2.0 * log(J))
 
 
 def yeoh(F: Any, q: Any) -> Any:

@@ -16,6 +16,7 @@ import numpy as np
 
 from problems.bodies import Body
 from problems.elements import Facets
+from problems.errors import DomainError
 from problems.problem import Array, Operator
 from problems.sparse import BlockDiagonal, GeneralPattern, SymmetricPattern
 from problems.supports import Supports
@@ -57,6 +58,18 @@ class Mechanics:
         """Constants of the law, positions of the nodes and load at p."""
         return self.unknown.apply(self.at_rest, p, xp)
 
+    def check(self, p: Array) -> None:
+        """Raises DomainError where p turns a cell inside out."""
+        if self.unknown.nodes is None:
+            return
+        _, dx = self.body.geometry.at(self.setting(p).X, np)
+        folded = np.flatnonzero(~(dx.real > 0.0).all(axis=1))
+        if folded.size:
+            raise DomainError(
+                f"{self.body.who}: at this p {folded.size} of {len(dx)} cells are inside out, first cell"
+                f" {folded[0] + 1} - move the nodes less"
+            )
+
     def metric(self, s: Setting, xp: Any) -> tuple[Any, Any]:
         """dN, dx of the cells; worked out anew only where p moves the nodes."""
         geometry = self.body.geometry
@@ -91,6 +104,15 @@ class Mechanics:
         """The same of a traction along the deformed normal, u_f (n_f, n_a, 3) the facets' displacements."""
         normals = self.loaded.normals(s.X[self.loaded.nodes] + u_f, xp)
         return s.load / (1.0 + case) * xp.einsum("fqa,fqi->fai", self.loaded.N, normals)
+
+    def external_forces(self, u: Array, s: Setting, case: int) -> Array | None:
+        """On the loaded facets, node by node (n_f, n_a, 3) [N]; None where a grip moves them."""
+        if self.load == "traction":
+            return np.asarray(self.dead_forces(s, case, np))
+        if self.load == "follower":
+            u_f = self.displacements(u, s, case, self.loaded.nodes)
+            return np.asarray(self.follower_forces(u_f, s, case, np))
+        return None
 
     def follower(self, u: Any, p: Any) -> Any:
         """-f_ext (n_u,) of a load that has no potential; traceable."""
@@ -140,6 +162,7 @@ class Mechanics:
         return np.asarray(to_clamp / (to_clamp + to_grip))
 
     def residual(self, u: Array, p: Array) -> Array:
+        self.check(p)
         return self._hand.residual(u, p) if self.by_hand else self._compiled(u, p)
 
     def tangent(self, u: Array, p: Array) -> Any:

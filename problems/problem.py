@@ -167,6 +167,7 @@ class Problem:
     linear     R is affine in u: one Newton step solves it
     offset     |X| where R is a function of X + u, as positions are: rounding is then relative to that
     structure  of R_u: "spd", "symmetric" (indefinite) or "general"
+    load_steps a solve that fails may proceed by R(u, p) - (1 - t) R(u_0, p) = 0, t from 0 to 1: the load in steps
     matrix_free  tangent_operator gives products with R_u without assembling it
     notes      sentences a user should read beside the result
     """
@@ -178,6 +179,7 @@ class Problem:
     linear: bool = False
     offset: float = 0.0
     structure: Structure = "general"
+    load_steps: bool = False
     matrix_free: bool = False
     notes: tuple[str, ...] = ()
 
@@ -188,10 +190,6 @@ class Problem:
     def initial(self, p: Array) -> Array:
         """The state (n_u,) a cold forward solve starts from, of p's dtype."""
         return np.zeros(self.n_state, dtype=p.dtype)
-
-    def load(self, p: Array) -> Array | None:
-        """The dead load f (n_u,) in R = f_int - f, by which a solve may proceed in steps; None if there is none."""
-        return None
 
     def residual(self, u: Array, p: Array) -> Array:
         """R(u, p), (n_u,)."""

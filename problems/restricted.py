@@ -39,7 +39,7 @@ class Selection:
             return v
         from problems.jax64 import jnp
 
-        return jnp.zeros(self.n_p).at[self.index].set(c)
+        return jnp.zeros(self.n_p, jnp.asarray(c).dtype).at[self.index].set(c)
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ class Restricted(Problem):
         self.name, self.notes = problem.name, problem.notes
         self.offers, self.structure, self.linear = problem.offers, problem.structure, problem.linear
         self.n_state, self.offset, self.matrix_free = problem.n_state, problem.offset, problem.matrix_free
+        self.load_steps = problem.load_steps
         self.parameters = Coordinates(**parameters, p=self.p, of=problem.parameters)
 
     def p(self, c: Any) -> Any:
@@ -102,9 +103,6 @@ class Restricted(Problem):
 
     def initial(self, p: Array) -> Array:
         return self.problem.initial(self.p(p))
-
-    def load(self, p: Array) -> Array | None:
-        return self.problem.load(self.p(p))
 
     def residual(self, u: Array, p: Array) -> Array:
         return self.problem.residual(u, self.p(p))

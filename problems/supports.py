@@ -77,10 +77,14 @@ class Supports:
 
 
 def check_clamp(body: Body, clamped: Array) -> None:
-    """Raises InputError where rigid motions are left: R_u would be singular."""
-    X = body.geometry.X[clamped]
-    spread = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) if len(X) else np.zeros(3)
-    if (spread > 1e-9 * body.size).sum() < 2:
-        raise InputError(
-            f"{body.who}: {len(clamped)} clamped nodes leave the body free to turn: R_u is singular - clamp a face"
-        )
+    """Raises InputError where rigid motions are left, of the body or of a part that hangs together with no other."""
+    parts = body.geometry.parts
+    for part in range(parts.max() + 1):
+        held = clamped[parts[clamped] == part]
+        X = body.geometry.X[held]
+        spread = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) if len(X) else np.zeros(3)
+        if (spread > 1e-9 * body.size).sum() < 2:
+            what = "the body" if parts.max() == 0 else f"part {part + 1} of {parts.max() + 1} that share no node"
+            raise InputError(
+                f"{body.who}: {len(held)} clamped nodes leave {what} free to turn: R_u is singular - clamp a face of it"
+            )

@@ -100,9 +100,9 @@ class Model:
             steps = self._direction(p, start, factors)
             u, history, scale = self._newton(u, p, scale, steps, polish=polish)
         except (NotConverged, SingularMatrix):
-            load = self.problem.load(p) if start is None else None
-            if load is None:
+            if start is not None or not self.problem.load_steps:
                 raise
+            load = -self.residual(u, p)
             steps = self._direction(p)
             u = by_load_steps(lambda t, u: self._newton(u, p, norm(load), steps, (1.0 - t) * load)[0], u, self._who)
             u, history, scale = self._newton(u, p, norm(load), steps, polish=polish)

@@ -43,8 +43,9 @@ class State:
     """A solved state: u (n_u,) and J at p (n_p,).
 
     factors belong to the last step (for a linear problem: to R_u itself), or to an earlier one after inexact steps:
-    rate is then the contraction that iterations with them saw, a product, else None. history holds |R|_inf of every
-    iterate, scale is the |R|_inf that tolerances are relative to, work what the solve took.
+    rate is then the contraction a product that iterations with them saw, or that the steps before let expect, else
+    None. history holds |R|_inf of every iterate, scale is the |R|_inf that tolerances are relative to, work what the
+    solve took.
     """
 
     p: Array
@@ -109,7 +110,13 @@ def newton(
             if polish == 0:
                 return u, tuple(history), scale
             polish, goal = polish - 1, 0.0
-    raise NotConverged(_report(who, history, f"wanted {solver.rtol * scale:.3g}"), tuple(history))
+    if not math.isfinite(history[-1]):
+        raise NotConverged(
+            f"{who}: R is not finite where the solve starts - lower the load or choose another p", tuple(history)
+        )
+    raise NotConverged(
+        _report(who, history, f"wanted {solver.rtol * scale:.3g}, max-steps={solver.max_steps}"), tuple(history)
+    )
 
 
 def _report(who: str, history: list[float], why: str) -> str:

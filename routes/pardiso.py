@@ -27,7 +27,7 @@ ORDERING, PIVOT_EPS, SCALING, TRANSPOSED, MATCHING, PERTURBED, ANALYSIS_KB, FACT
 SETTINGS = {ORDERING: 2, PIVOT_EPS: 12}
 UNSYMMETRIC = {SCALING: 1, MATCHING: 1}
 REGULAR = 1e-2  # error of a solution that was known before; a regular matrix leaves eps times its condition number
-IDLE = 2  # analyses kept for reuse, a pattern and kind
+IDLE = 6  # two for each of three load cases: analyses kept for reuse, a pattern and kind
 
 Idle = dict[tuple[int, bool], list[Any]]
 
@@ -72,11 +72,14 @@ class PardisoFactorization:
             solver = solver or self._analyzed(A, transposed)
         except RuntimeError as error:
             raise self._refusal(A, str(error)) from error
+        missed = solution_error(A.T if transposed else A, lambda b: self._substitute(solver, b))
+        if not missed < REGULAR:  # a singular L L^T may go unnoticed
+            raise self._refusal(A, f"a known solution is missed by {missed:.2g}")
         weakref.finalize(self, _keep, waiting, solver)
         return solver
 
     def _analyzed(self, A: Any, transposed: bool) -> Any:
-        """The first factors on a pattern are tried on a known solution: a singular L L^T may go unnoticed."""
+        """The first factors on a pattern."""
         from pymklpardiso import PardisoSolver
 
         unsymmetric = self._mtype in (GENERAL, COMPLEX_GENERAL)
@@ -85,9 +88,6 @@ class PardisoFactorization:
         perturbed = solver.get_iparm_value(PERTURBED)
         if perturbed:
             raise self._refusal(A, f"{perturbed} of its pivots are zero to 12 digits")
-        error = solution_error(A.T if transposed else A, lambda b: self._substitute(solver, b))
-        if not error < REGULAR:
-            raise self._refusal(A, f"a known solution is missed by {error:.2g}")
         return solver
 
     def _refusal(self, A: Any, why: str) -> SingularMatrix:

@@ -65,7 +65,7 @@ class Route:
     resolve   (model, p, affordable, **options) -> options, data-dependent defaults filled in by measurement, which
               ends early where `affordable(options)` says that they have become too dear to go on
     expect    (model, p, **options) -> options, the same by a cheap estimate
-    tape      (problem, **options) -> bytes the AD tape is predicted to need; None where there is none
+    tape      (problem, **options) -> bytes the AD tape is predicted to need for its iterations; None if unknown
     """
 
     name: str

@@ -15,7 +15,8 @@ class Work:
     residuals          evaluations of R
     matvecs            products with R_u or R_u^T, traced iterations included
     assemblies         assemblies of R_u
-    factorizations     numeric factorizations
+    factorizations     numeric factorizations of R_u, all its load cases at once; those PARDISO makes of R_u^T for the
+                       first transposed substitution with a matrix that is not symmetric are that substitution's
     solves             substitutions with factors of R_u, one per right-hand side
     transposed_solves  substitutions with factors of R_u^T, one per right-hand side
     """

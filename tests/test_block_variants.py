@@ -14,8 +14,11 @@ from skfem.io.meshio import from_meshio, to_meshio
 from bench.studies.sensitivity import slice_of
 from problems import bodies
 from problems.block import Block
-from problems.errors import InputError
+from problems.elements import Geometry
+from problems.errors import DomainError, InputError
+from problems.materials import LAWS
 from problems.problem import Array
+from problems.solid import gradient
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.finite_difference import fd_central, fd_one_sided
@@ -179,7 +182,14 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"clamped": "none"}, "free to turn"),
     ({"clamped": "nowhere"}, "no boundary 'nowhere'"),
     ({"loaded": "z=7"}, "no facet"),
-    ({"mesh": "nowhere.msh"}, "no such file"),
+    ({"mesh": "nowhere.msh", "nx": None, "ny": None, "nz": None}, "no such file"),
+    ({"mesh": "nowhere.msh"}, "nx does not go with mesh"),
+    ({"sensors": "left", "markers": 3}, "sensors does not go with markers"),
+    ({"components": "in-plane"}, "components needs markers"),
+    ({"load": "displacement", "traction": 9.0}, "traction does not go with load=displacement"),
+    ({"loaded": "bottom"}, "all its nodes are clamped"),
+    ({"sensors": "bottom"}, "read zero"),
+    ({"nx": 10**9}, "at most"),
     ({"law": "mooney-rivlin", "nu": 0.1}, "c = "),
     ({"derivatives": "hand", "law": "ogden"}, "not ogden"),
     ({"derivatives": "hand", "unknown": "shape"}, "not by shape"),
@@ -250,3 +260,77 @@ def test_meshes_that_are_none_are_refused(
             bodies.read("block", path)
     else:
         assert bodies.read("block", path).geometry.metric[1].sum() == pytest.approx(0.5)
+
+
+def test_elements_inside_out_bear_nothing_in_real_and_complex_arithmetic() -> None:
+    """Else Newton's method, or the complex step alone, would converge to states that no body can take."""
+    F = np.diag([1.0, 1.0, -0.5])
+    for law in LAWS.values():
+        if law.name != "linear":
+            q = law.of_modulus(1.0, 0.3)
+            for dtype in (float, complex):
+                assert not np.isfinite(gradient(law.W, 0)(F.astype(dtype), q)).all(), law.name
+            if law.hand is not None:
+                assert not np.isfinite(law.hand.P(F[None] + 0j, tuple(np.ones((len(q), 1))))).all()
+
+
+def test_a_shape_that_folds_a_cell_is_refused() -> None:
+    block = Block(**SMALL, unknown="shape")
+    p = block.parameters.start.copy()
+    p[::3] -= 1.2  # x of the nodes on the right face: behind the left one
+    with pytest.raises(DomainError, match="inside out, first cell"):
+        Model(block).solve(p)
+
+
+def test_points_in_distorted_and_in_flat_cells_are_found() -> None:
+    """x = sum_a N_a(xi) X_a in the cell that is named, whatever its neighbours' maps do out there."""
+    rng = np.random.default_rng(0)
+    for element, size in (("hex8", (1.0, 1.0, 1.0)), ("tet4", (1.0, 1.0, 20.0)), ("tet10", (20.0, 1.0, 0.05))):
+        body = bodies.box("box", element, (4, 4, 4), size)
+        geometry = body.geometry
+        if element == "hex8":
+            inside = ((geometry.X > 0.0) & (geometry.X < 1.0)).all(axis=1)
+            X = geometry.X + 0.06 * inside[:, None] * rng.uniform(-1, 1, geometry.X.shape)
+            geometry = Geometry(geometry.element, geometry.nodes, X)
+        x = rng.uniform(0.0, size, (200, 3))
+        cells, xi, outside = geometry.locate(x)
+        N, _ = geometry.element.shape_functions(xi.T)
+        np.testing.assert_allclose(np.einsum("ma,mai->mi", N, geometry.X[geometry.nodes[cells]]), x, atol=1e-8)
+        assert outside.max() < 1e-9
+
+
+def test_meshes_in_two_parts_and_of_two_kinds_are_refused(tmp_path: Path) -> None:
+    box = bodies.box("box", "hex8", (1, 1, 1), (1.0, 1.0, 1.0))
+    name, cells = box.geometry.for_meshio()
+    X = np.concatenate([box.geometry.X, box.geometry.X + np.array([0, 0, 1])])
+    two = tmp_path / "two.vtu"
+    Mesh(X, [(name, np.concatenate([cells, cells + 8]))]).write(two)
+    with pytest.raises(InputError, match="part 2 of 2"):
+        Block(mesh=str(two))
+    mixed = tmp_path / "mixed.vtu"
+    Mesh(X, [(name, cells), ("wedge", np.arange(8, 14)[None])]).write(mixed)
+    with pytest.raises(InputError, match="hexahedron, wedge"):
+        Block(mesh=str(mixed))
+    beyond = tmp_path / "beyond.vtu"
+    Mesh(X, [(name, cells + 12)]).write(beyond)
+    with pytest.raises(InputError, match="points beyond its 16"):
+        Block(mesh=str(beyond))
+
+
+def test_the_origin_of_a_mesh_does_not_loosen_the_solve(tmp_path: Path) -> None:
+    here, there = (str(tmp_path / f"{name}.vtu") for name in ("here", "there"))
+    box = bodies.box("box", "hex8", (2, 2, 2), (1.0, 1.0, 1.0))
+    name, cells = box.geometry.for_meshio()
+    for path, shift in ((here, 0.0), (there, 1e4)):
+        Mesh(box.geometry.X + shift, [(name, cells)]).write(path)
+    one, other = (Model(Block(mesh=path)).solve(Block(mesh=path).parameters.start) for path in (here, there))
+    assert other.residual < 1e-12
+    assert relative_error(other.u, one.u) < 1e-10  # eps times the shift in positions
+
+
+def test_a_twin_at_its_truth_has_no_gradient_and_nobody_says_it_is_wrong(cli) -> None:
+    command = "run --json --no-store --min-time 0 --problem block[n=2,data=twin] --at true --route adjoint"
+    (row,) = cli(*command.split()).rows
+    assert row["gradient_error"] < 1e-9
+    assert "zero: relative to its terms" in row["reference"]
+    assert row["note"] is None

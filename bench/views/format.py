@@ -27,8 +27,12 @@ def bytes_(value: float | None, resolution: int = 0) -> str:
     return size(value) if value >= resolution else f"<{size(resolution)}"
 
 
+def _exact(value: Any) -> str:
+    """As short as it can be read back; other values need other names."""
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
 def selector(name: str, options: dict[str, Any], defaults: dict[str, Any]) -> str:
     """`name[key=value]` with what differs from the defaults."""
-    shown = [f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}" for key, value in options.items()
-             if value != defaults.get(key)]  # fmt: skip
+    shown = [f"{key}={_exact(value)}" for key, value in options.items() if value != defaults.get(key)]
     return f"{name}[{','.join(shown)}]" if shown else name
