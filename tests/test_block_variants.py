@@ -277,7 +277,7 @@ def test_elements_inside_out_bear_nothing_in_real_and_complex_arithmetic() -> No
 def test_a_shape_that_folds_a_cell_is_refused() -> None:
     block = Block(**SMALL, unknown="shape")
     p = block.parameters.start.copy()
-    p[::3] -= 1.2  # x of the nodes on the right face: behind the left one
+    p[::3] -= 3.0  # x of the nodes on the right face: far behind the left one
     with pytest.raises(DomainError, match="inside out, first cell"):
         Model(block).solve(p)
 
