@@ -129,8 +129,6 @@ def test_inexact_steps_reach_the_state_of_full_ones_on_fewer_factors(name: str) 
 @pytest.mark.parametrize("route", [adjoint, tangent, complex_step], ids=lambda route: route.name)
 def test_gradients_after_inexact_steps_are_those_after_full_ones(name: str, route: Route) -> None:
     problem = CASES[name]
-    if name == "block[n=4]" and route is complex_step:
-        pytest.skip("the same as on block[n=2], for longer")
     p = somewhere(problem)
     full, inexact = (route.prepare(Model(problem, Solver(rtol=1e-13, newton=n)), p)(p) for n in ("full", "inexact"))
     assert relative_error(inexact.gradient, full.gradient) < 1e-11
