@@ -69,14 +69,15 @@ def test_every_route_gives_the_gradient_of_every_kind_of_block(name: str) -> Non
     exact = complex_step.prepare(Model(problem, TIGHT), p)(p).gradient
     J = Model(problem, TIGHT).solve(p).J
     tolerances = {
-        tangent: 1e-11,
+        tangent: 1e-11,  # the complex step's own 1e-12, see test_block, and what conditioning adds
         adjoint: 1e-11,
         implicit_ad: 1e-11,
-        unrolled_ad: 1e-8,
-        fd_central: 1e-7,
+        unrolled_ad: 1e-8,  # an iterate's derivative converges more slowly than the iterate
+        fd_central: 1e-7,  # eps^(2/3) and eps^(1/2), times ratios of derivatives
         fd_one_sided: 1e-5,
     }
     for route, tolerance in tolerances.items():
+        # Ogden's kernels compile longest: routes do not know the law, test_materials does
         if (route is unrolled_ad and name not in UNROLLED) or (route is not adjoint and name == "ogden"):
             continue
         if route.objection(problem) is None:

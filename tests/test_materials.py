@@ -123,7 +123,10 @@ def test_third_derivatives_at_the_natural_state_are_those_of_cauchys_integral(la
     """Where stretches coincide: d^3 W/dt^3 along I + t D, by AD three times and by W on a circle of t."""
     D = np.random.default_rng(3).standard_normal((3, 3))
     q = law.of_modulus(E, NU)
-    path = lambda t: law.W(IDENTITY + t * D, q)  # noqa: E731
+
+    def path(t: float) -> jax.Array:
+        return law.W(IDENTITY + t * D, q)
+
     d3 = jax.jit(jax.jacfwd(jax.jacfwd(jax.jacfwd(path))))(0.0)
     r, n = 0.1, 64  # truncated by r^64 of a series that converges beyond 0.2
     circle = r * np.exp(2j * np.pi * np.arange(n) / n)
