@@ -13,6 +13,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bench.commands.shared import (
+    SELECTOR,
+    at_option,
+    complain,
+    debug_option,
+    debugging,
+    linear_solver_option,
+    max_steps_option,
+    newton_option,
+    no_store_option,
+    rtol_option,
+    solver_of,
+    store_option,
+)
 from problems.errors import DomainError, InputError
 
 if TYPE_CHECKING:
@@ -22,7 +36,6 @@ if TYPE_CHECKING:
     from routes.newton import Newton
 
 WRONG_USAGE, INTERRUPTED = 2, 130
-STORE = Path("results") / "routes.sqlite"
 SHOWN = "-"  # --gradient without a file
 
 
@@ -54,11 +67,6 @@ class Routes(click.Group):
             ctx.exit(WRONG_USAGE)
 
 
-def complain(what: str) -> None:
-    """One line on stderr, whatever a name in it holds."""
-    click.echo(f"routes: {' '.join(what.split())}", err=True)
-
-
 def mend_streams() -> None:
     """A closed stream swallows what is written; a character the terminal cannot show is escaped."""
     for name in ("stdout", "stderr"):
@@ -81,17 +89,6 @@ def main() -> None:
     """
 
 
-store_option = click.option(
-    "--store", type=click.Path(path_type=Path), default=STORE, show_default=True, help="SQLite file that keeps results."
-)
-debug_option = click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks.")
-
-
-def debugging() -> bool:
-    """Asked before options are parsed, too: an error in them is one to debug."""
-    return "--debug" in sys.argv
-
-
 @main.command("list")
 @click.argument("what", required=False, type=click.Choice(["problems", "routes"]))
 @debug_option
@@ -107,10 +104,6 @@ def list_(what: str | None) -> None:
         out.print(listing("route"))
 
 
-SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
-AT = "The p to differentiate at; a file has a header line and n_p values in one column."
-LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg"]
-NEWTON = "Factors at every Newton step, or kept and iterated with."
 GRADIENT = "Show the gradient parameter by parameter beside its reference; with a file, write that as CSV instead."
 COMPONENTS = "Only so many components of dJ/dp, drawn at random: the bill of each, and its error."
 DIRECTIONS = "Only the slopes of J along so many random directions."
@@ -121,13 +114,13 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 @main.command()
 @click.option("--problem", "problems", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
 @click.option("--route", "routes", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
-@click.option("--at", default="start", show_default=True, metavar="start|true|FILE.csv", help=AT)
+@at_option
 @click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
 @click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
-@click.option("--rtol", type=float, default=1e-12, show_default=True, help="Forward solve: |R| relative to its start.")
-@click.option("--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most.")
-@click.option("--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True)
-@click.option("--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON)
+@rtol_option
+@max_steps_option
+@linear_solver_option
+@newton_option
 @click.option("--components", type=int, metavar="M", help=COMPONENTS)
 @click.option("--directions", type=int, metavar="M", help=DIRECTIONS)
 @click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
@@ -135,7 +128,7 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
 @store_option
-@click.option("--no-store", is_flag=True, help="Keep nothing.")
+@no_store_option
 @debug_option
 def run(
     problems: tuple[str, ...],
@@ -168,21 +161,18 @@ def run(
     from bench.runner import Settings
     from bench.runner import run as run_cases
     from bench.store import Store
-    from routes.newton import Solver
 
     if not budget > 0:
         raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
-    if not 0 < rtol < 1 or max_steps < 1:
-        raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
     partial = chosen(components, directions, seed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
     files.check(len(problem_specs) * len(route_specs), partial, [store, *case.files(problem_specs, at)])
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
-    solver = Solver(rtol, max_steps, linear_solver, newton)
+    solver = solver_of(rtol, max_steps, linear_solver, newton)
     settings = Settings(at, budget, min_time, gradient is not None, solver, partial, vtu is not None)
     outcomes = run_cases(problem_specs, route_specs, settings)
     kept = None if no_store else Store(store)
@@ -248,7 +238,7 @@ def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
 
 
 @main.command()
-@click.option("--table", type=click.Choice(["cases", "samples", "environments"]), default="cases", show_default=True)
+@click.option("--table", default="cases", show_default=True, help="One of those that results/README.md describes.")
 @click.option("--format", type=click.Choice(["csv", "parquet", "json"]), help="[that of FILE's name, else csv]")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write [stdout].")
 @store_option

@@ -10,16 +10,17 @@ from typing import Any
 
 import click
 
-from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED
-from bench.store import Store
+from bench.store import TABLES, Store
+from bench.suggest import did_you_mean
 from problems.errors import InputError
 
-DTYPES = {"INTEGER": "Int64", "REAL": "Float64", "TEXT": "string", "TEXT PRIMARY KEY": "string"}
-TYPES = {column.name: column.type for column in (*KEYS, *STORED, *SAMPLES, *ENVIRONMENTS)}
+DTYPES = {"INTEGER": "Int64", "REAL": "Float64", "TEXT": "string"}
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
     """Write a table of the store as CSV, Parquet or a JSON array of row objects, to a file or to stdout."""
+    if table not in TABLES:
+        raise InputError(f"export: no table '{table}' - {did_you_mean(table, TABLES)}")
     names, records = store.table(table)
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
@@ -30,10 +31,10 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         content = (json.dumps(rows, allow_nan=False) + "\n").encode()
     elif format == "parquet":
         buffer = io.BytesIO()
-        frame(names, records).to_parquet(buffer, index=False)
+        frame(table, names, records).to_parquet(buffer, index=False)
         content = buffer.getvalue()
     else:
-        content = frame(names, records).to_csv(index=False).encode()
+        content = frame(table, names, records).to_csv(index=False).encode()
     try:
         with click.open_file(str(output or "-"), "wb") as file:
             file.write(content)
@@ -44,9 +45,10 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         raise InputError(f"export: {where}: {error.strerror} - name a file you may write with -o") from error
 
 
-def frame(names: list[str], records: list[tuple[Any, ...]]) -> Any:
+def frame(table: str, names: list[str], records: list[tuple[Any, ...]]) -> Any:
     """A pandas DataFrame whose types are the schema's, whatever the data."""
     import pandas as pd  # half a second that only these formats pay
 
-    table = pd.DataFrame.from_records(records, columns=names)
-    return table.astype({name: DTYPES[TYPES.get(name, "TEXT")] for name in names})
+    types = {column.name: column.type for column in TABLES[table]}
+    data = pd.DataFrame.from_records(records, columns=names)
+    return data.astype({name: DTYPES[types.get(name, "TEXT").removesuffix(" PRIMARY KEY")] for name in names})

@@ -63,7 +63,7 @@ COLUMNS = (
 )
 
 KEYS = (
-    Column("case_id", "INTEGER", "", "counts the cases of this store"),
+    Column("case_id", "INTEGER PRIMARY KEY", "", "counts the cases of this store"),
     Column("environment_id", "TEXT", "", "of the row in environments"),
 )
 
@@ -120,6 +120,13 @@ def storable(value: Any) -> Any:
     return float(value) if isinstance(value, int) and value >= 2**63 else value
 
 
+def stored(column: Column, value: Any) -> Any:
+    """A value as SQLite keeps it: objects as JSON text."""
+    if column.json and value is not None:
+        return json.dumps(clean(value), allow_nan=False)
+    return storable(value)
+
+
 def as_json(row: Row) -> str:
     """One JSON object on one line."""
     return json.dumps(clean(row), allow_nan=False)
@@ -133,11 +140,8 @@ def as_record(row: Row) -> tuple[Any, ...]:
             prefix, _, kind = column.name.partition("_")
             work = row[WORK_PREFIX[prefix]]
             record.append(None if work is None else storable(work[kind]))
-        elif column.json:
-            value = row[column.name]
-            record.append(None if value is None else json.dumps(clean(value), allow_nan=False))
         else:
-            record.append(storable(row[column.name]))
+            record.append(stored(column, row[column.name]))
     return tuple(record)
 
 

@@ -1,27 +1,34 @@
-"""Every run is kept: an append-only SQLite file with the tables cases, samples and environments.
+"""Every run is kept: an append-only SQLite file with the tables cases, samples, environments and those of studies.
 
-One case is one transaction, so a process killed at any moment loses at most the case in flight; writers wait
-for each other.
+One case, or one study, is one transaction, so a process killed at any moment loses at most the one in flight; writers
+wait for each other.
 """
 
 from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 from bench.environment import environment, fingerprint
-from bench.rows import ENVIRONMENTS, SAMPLES, STORED, Row, as_record, from_record
+from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED, Column, Row, as_record, from_record, stored
+from bench.study_rows import KEY, STUDIES, STUDY
 from bench.timing import Samples
 from problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
-SCHEMA = 2  # 2: columns partial and tape_bytes_per_iteration
+SCHEMA = 3  # 2: columns partial and tape_bytes_per_iteration; 3: tables of studies
 PATIENCE = 60.0  # [s] to wait for another writer
-TABLES = ("cases", "samples", "environments")
+TABLES: dict[str, tuple[Column, ...]] = {
+    "cases": (KEYS[0], KEYS[1], *STORED),
+    "samples": SAMPLES,
+    "environments": ENVIRONMENTS,
+    "studies": STUDY,
+    **{name: (KEY, *columns) for name, columns in STUDIES.items()},
+}
 
 
 class Store:
@@ -47,6 +54,20 @@ class Store:
                 timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
                 db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
 
+    def append_study(self, tables: Mapping[str, Sequence[Row]], started: str) -> int:
+        """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""
+        with self._transaction() as db:
+            values = (next(iter(tables)), self._environment_id(db), started)
+            cursor = db.execute("INSERT INTO studies (study, environment_id, started) VALUES (?, ?, ?)", values)
+            study_id = int(cursor.lastrowid or 0)
+            for name, rows in tables.items():
+                columns = STUDIES[name]
+                marks = ", ".join("?" * (1 + len(columns)))
+                names = ", ".join(c.name for c in (KEY, *columns))
+                records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in rows]
+                db.executemany(f"INSERT INTO {name} ({names}) VALUES ({marks})", records)
+            return study_id
+
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
         with self._errors():
@@ -56,6 +77,8 @@ class Store:
                 if not self._has_tables(db):
                     raise InputError(f"store {self.path}: is empty - run `routes run` first, or name another")
                 self._check_kind(db)
+                if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
+                    return [c.name for c in TABLES[name]], []  # a store of an older schema
                 cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
                 return [d[0] for d in cursor.description], cursor.fetchall()
 
@@ -74,7 +97,7 @@ class Store:
                 db.execute("BEGIN IMMEDIATE")
                 if self._has_tables(db):
                     self._check_kind(db)
-                    self._add_columns(db)
+                    self._migrate(db)
                 else:
                     self._create(db)
                 yield db
@@ -90,19 +113,20 @@ class Store:
     def _create(self, db: sqlite3.Connection) -> None:
         if db.execute("PRAGMA application_id").fetchone()[0] != 0:
             self._check_kind(db)
-        cases = ", ".join(f"{c.name} {c.type}" for c in STORED)
-        samples = ", ".join(f"{c.name} {c.type}" for c in SAMPLES)
-        environments = ", ".join(f"{c.name} {c.type}" for c in ENVIRONMENTS)
-        db.execute(f"CREATE TABLE environments ({environments})")
-        db.execute(f"CREATE TABLE cases (case_id INTEGER PRIMARY KEY, environment_id TEXT, {cases})")
-        db.execute(f"CREATE TABLE samples ({samples})")
+        self._create_tables(db)
         db.execute(f"PRAGMA application_id = {APPLICATION}")
         db.execute(f"PRAGMA user_version = {SCHEMA}")
 
     @staticmethod
-    def _add_columns(db: sqlite3.Connection) -> None:
+    def _create_tables(db: sqlite3.Connection) -> None:
+        """Those that are not there yet."""
+        for name, columns in TABLES.items():
+            db.execute(f"CREATE TABLE IF NOT EXISTS {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
+
+    def _migrate(self, db: sqlite3.Connection) -> None:
         """What an older schema lacks is added, absent in its rows."""
         if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
+            self._create_tables(db)
             there = {column[1] for column in db.execute("PRAGMA table_info(cases)")}
             for column in STORED:
                 if column.name not in there:

@@ -9,7 +9,7 @@ It never solves and never differentiates through a solve; that is what routes ar
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
@@ -169,6 +169,8 @@ class Problem:
     structure  of R_u: "spd", "symmetric" (indefinite) or "general"
     load_steps a solve that fails may proceed by R(u, p) - (1 - t) R(u_0, p) = 0, t from 0 to 1: the load in steps
     matrix_free  tangent_operator gives products with R_u without assembling it
+    line_search  False where full Newton steps converge from anywhere, R being convex with R_u^{-1} >= 0 (Ortega &
+               Rheinboldt 1970, 13.3.4) or an active-set search ending: halving steps would only get in the way
     notes      sentences a user should read beside the result
     """
 
@@ -181,6 +183,7 @@ class Problem:
     structure: Structure = "general"
     load_steps: bool = False
     matrix_free: bool = False
+    line_search: bool = True
     notes: tuple[str, ...] = ()
 
     def value(self, p: Array) -> float:
@@ -230,6 +233,25 @@ class Problem:
     def observed(self, u: Array) -> Problem:
         """This problem with the data its sensors read of the state u (n_u,), and noise on them if it was asked for."""
         raise NotOffered(f"{self.name}: has no synthetic data")
+
+    def active_set(self, u: Array, p: Array) -> Hashable | None:
+        """Which smooth branch of a piecewise smooth R holds at (u, p), a word or a tuple; None where R is smooth."""
+        return None
+
+    def refined(self) -> Problem | None:
+        """The same problem on a mesh of half the size, or None where it has no mesh."""
+        return None
+
+    def integral(self, u: Array, p: Array) -> tuple[float, Array] | None:
+        """Another functional and its derivative by u (n_u,): the integral that J, a sum over nodes, stands for."""
+        return None
+
+    def continuous_adjoint(self, u: Array, p: Array) -> tuple[Any, Operator] | None:
+        """The adjoint equation derived first and discretized then: A and Q, A lam = -J_u, dJ/dp = J_p + Q^T lam.
+
+        They equal R_u^T and R_p only as the mesh size h goes to 0, and so does the gradient.
+        """
+        return None
 
     def condition(self, p: Array) -> float | None:
         """Estimate of the condition number of R_u, used only to predict iteration counts before paying for them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -91,7 +91,7 @@ class Restricted(Problem):
         self.name, self.notes = problem.name, problem.notes
         self.offers, self.structure, self.linear = problem.offers, problem.structure, problem.linear
         self.n_state, self.offset, self.matrix_free = problem.n_state, problem.offset, problem.matrix_free
-        self.load_steps = problem.load_steps
+        self.load_steps, self.line_search = problem.load_steps, problem.line_search
         self.parameters = Coordinates(**parameters, p=self.p, of=problem.parameters)
 
     def p(self, c: Any) -> Any:
@@ -137,6 +137,9 @@ class Restricted(Problem):
             return None
         norm = 1.0 if isinstance(self.V, Selection) else float(np.linalg.norm(np.asarray(self.V)))
         return Reference(inner.name, self.V.T @ inner.gradient, norm * inner.size)
+
+    def active_set(self, u: Array, p: Array) -> Hashable | None:
+        return self.problem.active_set(u, self.p(p))
 
     def condition(self, p: Array) -> float | None:
         return self.problem.condition(self.p(p))

@@ -129,7 +129,7 @@ class DenseFactorization:
             try:
                 self.lu = lu_factor(A)
             except (LinAlgWarning, ValueError) as error:
-                raise SingularMatrix(f"{who}: R_u ({len(A)} x {len(A)}): {error} - check the constraints") from error
+                raise SingularMatrix(f"{who}: R_u ({len(A)} x {len(A)}): {error} - check p and the supports") from error
         self.norm, self.nbytes = float(np.abs(A).sum(axis=1).max()), A.nbytes
 
     def solve(self, b: Array) -> Array:
@@ -154,7 +154,7 @@ class SparseFactorization:
         try:
             self.lu: Any = splu(A.tocsc())
         except RuntimeError as error:
-            raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check the constraints") from error
+            raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check p and the supports") from error
 
         self.norm = float(abs(A).sum(axis=1).max())
         missed = solution_error(A, self.solve)

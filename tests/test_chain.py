@@ -86,5 +86,5 @@ def test_singular_matrices_are_refused_with_a_sentence() -> None:
     with pytest.raises(SingularMatrix, match="element 2"):
         factorize(Chain(np.array([1.0, 0.0])), "test")
     for A in (np.zeros((2, 2)), csr_array((2, 2)), csr_array(np.diag([1.0, 0.0]))):
-        with pytest.raises(SingularMatrix, match="check the constraints"):
+        with pytest.raises(SingularMatrix, match="check p and the supports"):
             factorize(A, "test")

@@ -58,6 +58,25 @@ def test_not_a_number_is_absent_and_huge_counts_are_kept(tmp_path: Path) -> None
     assert back["predicted_tape_bytes"] == 2.0**80
 
 
+def test_an_unknown_table_is_one_line(cli) -> None:
+    ran = cli("export", "--table", "casse")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "no table 'casse' - did you mean 'cases'?" in ran.err
+
+
+def test_a_store_of_an_older_schema_gets_the_tables_of_studies(tmp_path: Path) -> None:
+    store = Store(tmp_path / "s.sqlite")
+    store.append(row(), None)
+    with closing(sqlite3.connect(store.path)) as db:
+        db.execute("DROP TABLE studies")
+        db.execute("PRAGMA user_version = 2")
+    assert store.table("studies")[1] == []
+    store.check_writable()
+    assert store.rows() == [row()]
+    with closing(sqlite3.connect(store.path)) as db:
+        assert db.execute("PRAGMA user_version").fetchone()[0] == SCHEMA
+
+
 def test_the_store_is_append_only_and_counts_up(cli) -> None:
     cli(*RUN)
     first = Store("results/routes.sqlite").table("cases")[1]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED, Column
+from bench.rows import Column
+from bench.store import TABLES
 
 HEAD = """# Results
 
@@ -16,8 +17,7 @@ Columns that hold objects (options, gradient, threads, versions) are JSON text.
 
 def markdown() -> str:
     """All tables and columns with their units and meanings."""
-    tables = {"cases": (*KEYS, *STORED), "samples": SAMPLES, "environments": ENVIRONMENTS}
-    return HEAD + "".join(f"\n## {name}\n\n{_table(columns)}" for name, columns in tables.items())
+    return HEAD + "".join(f"\n## {name}\n\n{_table(columns)}" for name, columns in TABLES.items())
 
 
 def _table(columns: Iterable[Column]) -> str:

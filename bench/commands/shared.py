@@ -1,0 +1,59 @@
+"""What verbs share: options, one-line complaints, a store that may be full."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from routes.factorization import LinearSolver
+    from routes.newton import Newton, Solver
+
+STORE = Path("results") / "routes.sqlite"
+SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
+AT = "The p to differentiate at; a file has a header line and n_p values in one column."
+LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg"]
+NEWTON = "Factors at every Newton step, or kept and iterated with."
+
+store_option = click.option(
+    "--store", type=click.Path(path_type=Path), default=STORE, show_default=True, help="SQLite file that keeps results."
+)
+no_store_option = click.option("--no-store", is_flag=True, help="Keep nothing.")
+debug_option = click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks.")
+at_option = click.option("--at", default="start", show_default=True, metavar="start|true|FILE.csv", help=AT)
+rtol_option = click.option(
+    "--rtol", type=float, default=1e-12, show_default=True, help="Forward solve: |R| relative to its start."
+)
+max_steps_option = click.option(
+    "--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most."
+)
+linear_solver_option = click.option(
+    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True
+)
+newton_option = click.option(
+    "--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON
+)
+
+
+def solver_of(rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton) -> Solver:
+    """The forward solver the options ask for. Raises InputError."""
+    from routes.newton import Solver
+
+    if not 0 < rtol < 1 or max_steps < 1:
+        raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
+    return Solver(rtol, max_steps, linear_solver, newton)
+
+
+def complain(what: str) -> None:
+    """One line on stderr, whatever a name in it holds."""
+    click.echo(f"routes: {' '.join(what.split())}", err=True)
+
+
+def debugging() -> bool:
+    """Asked before options are parsed, too: an error in them is one to debug."""
+    return "--debug" in sys.argv
