@@ -66,7 +66,7 @@ def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str,
         if chosen.name == "all":
             if chosen.grid:
                 raise InputError(f"selector '{text}' - 'all' takes no options; name the {kind} to set one")
-            names = [name for name, entry in registry.entries(kind).items() if entry.failure is None]
+            names = [name for name, entry in registry.entries(kind).items() if entry.sound]
         else:
             names = [chosen.name]
         for name in names:

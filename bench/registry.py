@@ -51,6 +51,11 @@ class Entry:
         return target
 
     @property
+    def sound(self) -> bool:
+        """Whether `all` names it: it can be imported, and is not wrong on purpose."""
+        return self.failure is None and getattr(self.load(), "sound", True)
+
+    @property
     def failure(self) -> str | None:
         try:
             self.load()
@@ -87,6 +92,7 @@ ORDER = (
     "adjoint",
     "unrolled-ad",
     "implicit-ad",
+    "faulty-adjoint",
 )
 
 

@@ -19,6 +19,7 @@ Start = Annotated[
 StepOption = Annotated[float | None, "h_i / max(|p_i|, s_i) [sqrt(eps) one-sided, cbrt(eps) central]"]
 EPS = float(np.finfo(np.float64).eps)
 ONE_SIDED, CENTRAL = EPS ** (1 / 2), EPS ** (1 / 3)  # truncation and round-off balance there
+SCATTER = 1e3  # what second derivatives and rounding in J add to the balance of a well-scaled problem
 
 
 def check(*, step: float | None, start: str) -> None:
@@ -44,7 +45,14 @@ def near(forward: ForwardWork, start: str) -> Callable[[int, float], Work]:
     return forward.warm if start == "warm" else forward.chord
 
 
-@route("fd-one-sided", needs=Offers.VALUE, cost=cost_one_sided, check=check, missing=missing)
+@route(
+    "fd-one-sided",
+    needs=Offers.VALUE,
+    cost=cost_one_sided,
+    check=check,
+    missing=missing,
+    accuracy=SCATTER * ONE_SIDED,
+)
 def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p)) / h_i,  h_i = sqrt(eps) max(|p_i|, s_i)."""
     h = steps(model.parameters, p, ONE_SIDED if step is None else step, "fd-one-sided", sides=(1,))
@@ -54,7 +62,14 @@ def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Star
     return Result(J, gradient)
 
 
-@route("fd-central", needs=Offers.VALUE, cost=cost_central, check=check, missing=missing)
+@route(
+    "fd-central",
+    needs=Offers.VALUE,
+    cost=cost_central,
+    check=check,
+    missing=missing,
+    accuracy=SCATTER * CENTRAL**2,
+)
 def fd_central(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p - h_i e_i)) / 2 h_i,  h_i = cbrt(eps) max(|p_i|, s_i)."""
     h = steps(model.parameters, p, CENTRAL if step is None else step, "fd-central", sides=(1, -1))

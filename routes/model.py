@@ -17,12 +17,12 @@ from routes.tally import Tally
 
 
 class Model:
-    """A problem that can be solved, with its work counted in `tally`."""
+    """A problem that can be solved, with its work counted in `tally`, its own or the one given."""
 
-    def __init__(self, problem: Problem, solver: Solver | None = None) -> None:
+    def __init__(self, problem: Problem, solver: Solver | None = None, tally: Tally | None = None) -> None:
         self.problem = problem
         self.solver = solver or Solver()
-        self.tally = Tally()
+        self.tally = tally or Tally()
         self._factorize = Factorizer(self.solver.linear_solver)
 
     @property

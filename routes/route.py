@@ -66,6 +66,8 @@ class Route:
               ends early where `affordable(options)` says that they have become too dear to go on
     expect    (model, p, **options) -> options, the same by a cheap estimate
     tape      (problem, **options) -> bytes the AD tape is predicted to need for its iterations; None if unknown
+    sound     False for one that is wrong on purpose, which `all` leaves out
+    accuracy  relative error its gradients have by nature on well-scaled problems; 0: that of the solver
     """
 
     name: str
@@ -78,6 +80,8 @@ class Route:
     resolve: Callable[..., Options] = as_given
     expect: Callable[..., Options] = as_given
     tape: Callable[..., int | None] | None = None
+    sound: bool = True
+    accuracy: float = 0.0
 
     @property
     def summary(self) -> str:

@@ -1,0 +1,54 @@
+"""Second evidence: Taylor remainders, complex steps, and the factors of the gradient one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bench.checking.curve import fit
+from bench.checking.examine import Examination
+from bench.checking.finding import Finding
+from bench.checking.probe import directions
+from problems.errors import RoutesError
+from problems.problem import Array
+
+COUNT = 3  # random directions of complex steps
+COMPLEX = 1e-9  # relative: what complex steps and linearized solves of tolerance 1e-12 leave
+RATE = 0.15  # of the rates 1 and 2 of Taylor remainders
+
+
+def evidence(seen: Examination) -> Iterator[Finding]:
+    """All there is: nothing of it decides a verdict of differences, all of it explains one."""
+    yield from taylor(seen)
+    yield from complex_steps(seen)
+    if seen.subject.explain is not None:
+        yield from seen.subject.explain(seen.gradient)
+
+
+def taylor(seen: Examination) -> Iterator[Finding]:
+    """Rates of |J(p + h v) - J(p)| ~ h and |J(p + h v) - J(p) - h g.v| ~ h^2, from the first line's own points."""
+    if not seen.readings:
+        return
+    made = seen.readings[0].sweep
+    for order, off in ((1, made.forward), (2, made.off_forward)):
+        remainder: Array = np.abs(off * made.h)
+        rate = fit(made.h, remainder / (np.nanmax(remainder) or 1.0) if remainder.size else remainder).slope
+        if rate is not None:
+            what = "with the gradient" if order == 2 else "without it"
+            yield Finding(f"Taylor remainder {what}", abs(rate - order), RATE, f"rate {rate:.3g}, expected {order}")
+
+
+def complex_steps(seen: Examination) -> Iterator[Finding]:
+    """V^T g against Im J(p + i h v) / h."""
+    subject = seen.subject
+    if subject.slopes is None:
+        return
+    V = np.column_stack([line.v for line in directions(subject, COUNT, seen.plan.seed + 2)])
+    try:
+        exact = subject.slopes(V)
+    except RoutesError as failure:
+        yield Finding("complex step", float("nan"), COMPLEX, str(failure))
+        return
+    off = float(np.linalg.norm(V.T @ seen.gradient - exact) / (np.linalg.norm(exact) or 1.0))
+    yield Finding("complex step", off, max(COMPLEX, seen.accepted if subject.accuracy else 0.0), f"{COUNT} directions")

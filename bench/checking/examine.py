@@ -1,0 +1,104 @@
+"""Look at a gradient along several lines: the part that costs objective calls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bench.checking.asked import Asked, ask
+from bench.checking.guarded import Guarded
+from bench.checking.noise import noise
+from bench.checking.plan import Plan
+from bench.checking.probe import Probe, Sweep, chosen_components, components, directions, sweep
+from bench.checking.reading import Reading, stencil_changes
+from bench.checking.subject import Subject
+from problems.problem import Array
+
+EQUAL = 1e-7  # seven digits: differences seldom give more, and nobody asks for more
+PER_EPS = 100.0  # relative error that is rounding, in eps of the numbers
+REPEATS = 4  # further evaluations at p, where two differ
+
+
+@dataclass
+class Examination:
+    """A subject, its gradient, its J with everything known of it, and the readings made so far."""
+
+    subject: Subject
+    plan: Plan
+    J: Guarded
+    asked: Asked
+    J_0: float
+    repeated: Array
+    accepted: float
+    readings: list[Reading] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, subject: Subject, plan: Plan, J: Guarded, accepted: float = 0.0) -> Examination:
+        """Ask for the gradient once and for J(p) twice. Raises Unusable."""
+        values = [J(subject.p), J(subject.p)]
+        J.account.gradients += 1
+        asked = ask(subject)
+        if np.isfinite(values).all() and values[0] != values[1]:
+            values += [J(subject.p) for _ in range(REPEATS) if J.left() > 0]
+        repeated = np.array([v for v in values if np.isfinite(v)])
+        J_0 = float(repeated.mean()) if repeated.size else float("nan")
+        by_precision = PER_EPS * asked.eps if asked.eps > np.finfo(np.float64).eps else 0.0
+        allowed = max(EQUAL, accepted, subject.accuracy, by_precision)
+        return cls(subject, plan, J, asked, J_0, repeated, allowed)
+
+    @property
+    def gradient(self) -> Array:
+        return self.asked.gradient
+
+    @property
+    def size(self) -> float:
+        """|g w|_2, the slope of J along a random natural change."""
+        return float(np.linalg.norm(self.gradient * self.subject.natural))
+
+    def lines(self) -> list[Probe]:
+        """A random direction first, then components, then the other directions."""
+        plan, n_p = self.plan, len(self.subject.p)
+        few = plan.components
+        indices = chosen_components(self.gradient, self.subject.natural, few) if isinstance(few, int) else list(few)
+        first, *others = directions(self.subject, plan.directions, plan.seed)
+        if n_p == 1:
+            return components(self.subject, [0])
+        return [first, *components(self.subject, indices), *others]
+
+    def look(self, lines: Sequence[Probe]) -> None:
+        """Read every line: over all steps, or near the best step of the first."""
+        for k, line in enumerate(lines):
+            best = self.readings[0].level if self.readings else None
+            if self.plan.everywhere or k == 0 or best is None:
+                self.readings.append(self.read(line, self.plan.steps))
+                continue
+            reading = self.read(line, self.plan.near(best.h))
+            self.readings.append(self._wider(reading))
+
+    def read(self, line: Probe, h: Array) -> Reading:
+        """The sweep of one line, as far as the budget goes."""
+        return self._reading(sweep(self.J, self.J_0, self.subject, self.gradient, line, h))
+
+    def _wider(self, reading: Reading) -> Reading:
+        """Where few steps could not tell, the same number again on the side where it gets better."""
+        if reading.says in ("agrees", "nothing") or not np.isfinite(reading.sweep.central).any():
+            return reading
+        h, variation = reading.sweep.h, np.abs(np.diff(reading.sweep.off_central))
+        below = np.nansum(variation[: len(variation) // 2]) < np.nansum(variation[len(variation) // 2 :])
+        steps = self.plan.steps
+        more = steps[steps < h[0]][-len(h) :] if below else steps[steps > h[-1]][: len(h)]
+        if self.J.left() < 2 * len(more):
+            return reading
+        extra = sweep(self.J, self.J_0, self.subject, self.gradient, reading.sweep.probe, more)
+        return self._reading(reading.sweep.joined(extra))
+
+    def _reading(self, made: Sweep) -> Reading:
+        alone = len(made.h) < len(self.plan.steps) and self.readings  # few steps tell less of J's noise than all do
+        sigma = self.readings[0].noise if alone else noise(made, self.J.eps, self.repeated)
+        reading = Reading(made, sigma, self.size, self.accepted)
+        active_set = self.subject.active_set
+        if active_set is None:
+            return reading
+        return replace(reading, changes=stencil_changes(active_set, self.subject.p, made.probe.v))

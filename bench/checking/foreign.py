@@ -1,0 +1,144 @@
+"""Other people's code as the subject of a check: functions, or an object that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from bench.checking.subject import Subject, natural_scale, vector
+from problems.errors import InputError
+from problems.problem import Array, default_label
+
+OFFERED = ("objective", "gradient", "value_and_gradient", "start")
+Bounds = tuple[Any, Any]
+
+
+def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
+    """A subject out of an object with objective(p) and gradient(p), or value_and_gradient(p), and start (n_p,).
+
+    Optional: scale, bounds (lower, upper), names, tighten(factor), active_set(p). `start` overrides the object's.
+    A class, or a function that makes the object, is called first. Raises InputError for what is missing.
+    """
+    if isinstance(thing, type) or (callable(thing) and not _complete(thing)):
+        thing = _made(thing, name)
+    both = getattr(thing, "value_and_gradient", None)
+    objective, gradient = getattr(thing, "objective", None), getattr(thing, "gradient", None)
+    if callable(both):
+        value_and_gradient = Both(both)
+        objective = objective if callable(objective) else value_and_gradient.value
+        gradient = gradient if callable(gradient) else value_and_gradient.gradient
+    if not callable(objective) or not callable(gradient):
+        raise InputError(
+            f"check: {name} has no objective(p) and gradient(p), nor value_and_gradient(p) - it has"
+            f" {', '.join(n for n in dir(thing) if not n.startswith('_')) or 'nothing'}"
+        )
+    given = getattr(thing, "start", None) if start is None else start
+    if given is None:
+        raise InputError(f"check: {name} has no start - give it one, an array (n_p,), or a point with --at FILE.csv")
+    tighten = getattr(thing, "tighten", None)
+
+    def tightened(factor: float) -> Subject:
+        return subject_of(tighten(factor), name, given) if tighten is not None else subject_of(thing, name, given)
+
+    return subject(
+        objective,
+        gradient,
+        given,
+        name=name,
+        scale=getattr(thing, "scale", None),
+        bounds=getattr(thing, "bounds", None),
+        names=getattr(thing, "names", None),
+        tighten=tightened if callable(tighten) else None,
+        active_set=getattr(thing, "active_set", None),
+    )
+
+
+def subject(
+    objective: Callable[[Array], Any],
+    gradient: Callable[[Array], Any],
+    start: Any,
+    *,
+    name: str = "the gradient",
+    scale: Any = None,
+    bounds: Bounds | None = None,
+    names: Sequence[str] | None = None,
+    tighten: Callable[[float], Subject] | None = None,
+    active_set: Callable[[Array], Any] | None = None,
+) -> Subject:
+    """A subject out of plain functions. Raises InputError."""
+    p = vector(start, None, "start")
+    if not np.isfinite(p).all():
+        raise InputError(f"check: start[{int(np.flatnonzero(~np.isfinite(p))[0])}] is not finite - start somewhere")
+    n_p = len(p)
+    s = natural_scale(p) if scale is None else vector(scale, n_p, "scale")
+    if not ((s > 0) & np.isfinite(s)).all():
+        raise InputError(f"check: scale[{int(np.flatnonzero(~(s > 0))[0]) if (s <= 0).any() else 0}] - give scales > 0")
+    lower, upper = _bounds(bounds, n_p)
+    outside = np.flatnonzero((p < lower) | (p > upper))
+    if outside.size:
+        i = int(outside[0])
+        raise InputError(
+            f"check: start[{i}] = {p[i]:g} is outside its bounds {lower[i]:g} to {upper[i]:g} - start inside"
+        )
+    if names is not None and len(names) != n_p:
+        raise InputError(f"check: {len(names)} names for {n_p} parameters - give one each")
+    label = default_label if names is None else (lambda i: str(names[i]))
+    return Subject(name, objective, gradient, p, s, lower, upper, True, label, None, tighten, active_set)
+
+
+class Both:
+    """value_and_gradient(p) as two functions; the last point is kept, so that asking for both costs one call."""
+
+    def __init__(self, both: Callable[[Array], Any]) -> None:
+        self._both = both
+        self._last: tuple[bytes, Any] | None = None
+
+    def _at(self, p: Array) -> tuple[Any, Any]:
+        value, gradient = self._both(p)
+        return value, gradient
+
+    def value(self, p: Array) -> Any:
+        return self._at(p)[0]
+
+    def gradient(self, p: Array) -> Any:
+        return self._at(p)[1]
+
+
+def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:
+    if bounds is None:
+        return np.full(n_p, -np.inf), np.full(n_p, np.inf)
+    try:
+        pair = list(bounds)
+    except TypeError:
+        pair = []
+    if len(pair) == n_p != 2 and all(np.size(b) == 2 for b in pair):  # SciPy's list of pairs, None for no bound
+        pair = [[b[k] for b in pair] for k in (0, 1)]
+    if len(pair) != 2:
+        raise InputError("check: bounds are (lower, upper), numbers or arrays (n_p,), or one pair a parameter")
+    ends = [_without_none(end, limit) for end, limit in zip(pair, (-np.inf, np.inf), strict=True)]
+    lower, upper = (vector(end, n_p, f"bounds[{k}]") for k, end in enumerate(ends))
+    return lower, upper
+
+
+def _without_none(end: Any, limit: float) -> Any:
+    if end is None:
+        return limit
+    return [limit if e is None else e for e in end] if isinstance(end, list | tuple) else end
+
+
+def _complete(thing: Any) -> bool:
+    return callable(getattr(thing, "gradient", None)) or callable(getattr(thing, "value_and_gradient", None))
+
+
+def _made(make: Callable[[], Any], name: str) -> Any:
+    try:
+        return make()
+    except TypeError as error:
+        raise InputError(
+            f"check: {name} is a function or class that wants arguments ({error}) - name an object with objective(p),"
+            " gradient(p) and start, or give --objective and --gradient"
+        ) from error
+    except Exception as error:  # somebody else's code
+        raise InputError(f"check: {name} cannot be made: {type(error).__name__}: {error} - mend it") from error

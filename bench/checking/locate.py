@@ -1,0 +1,138 @@
+"""Which components of a gradient are wrong, by halving: a direction restricted to half of them tells which half."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.checking.guarded import Guarded
+from bench.checking.plateau import DIFFERENT
+from bench.checking.probe import Probe, components, sweep
+from bench.checking.reading import Reading
+from bench.checking.subject import Subject
+from problems.problem import Array
+
+MOST = 4  # wrong components searched for; more make the whole gradient suspect
+AROUND = 10.0 ** np.array([-0.5, 0.0, 0.5])  # steps about the best one, to measure a component that was found
+ALIKE = 0.02  # relative scatter of factors that are one factor
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A wrong component: given and by differences, dJ/dp_i both."""
+
+    name: str
+    index: int
+    given: float
+    found: float
+
+    @property
+    def factor(self) -> float | None:
+        """given / found."""
+        return self.given / self.found if self.found else None
+
+
+@dataclass(frozen=True)
+class Located:
+    """worst components, largest first; whether the others were then found right; `everywhere`: many are wrong."""
+
+    worst: tuple[Worst, ...]
+    others_right: bool = False
+    everywhere: bool = False
+
+    @property
+    def factor(self) -> float | None:
+        """The one factor that all wrong components are off by, if there is one."""
+        factors = [w.factor for w in self.worst]
+        if len(factors) < 2 or None in factors:
+            return None
+        values = np.array(factors, dtype=float)
+        middle = float(np.median(values))
+        return middle if float(np.abs(values - middle).max()) <= ALIKE * abs(middle) else None
+
+
+class Search:
+    """Restricted directions at one step, against what noise and truncation allow at that step."""
+
+    def __init__(self, J: Guarded, J_0: float, subject: Subject, gradient: Array, plateau: Reading, seed: int) -> None:
+        assert plateau.level is not None
+        self.J, self.J_0, self.subject = J, J_0, subject
+        self.gradient, self.w = gradient.copy(), subject.natural
+        self.h = np.array([plateau.level.h])
+        self.allowed = max(DIFFERENT * plateau.level.uncertainty, plateau.accepted * plateau.size)
+        self.rng = np.random.default_rng(seed)
+        self.plateau = plateau
+
+    def off(self, members: Array) -> float:
+        """|quotient - slope| along a random direction of these components; two calls."""
+        v = np.zeros_like(self.w)
+        xi = self.rng.choice([-1.0, 1.0], len(members)) * self.rng.uniform(0.75, 1.25, len(members))
+        v[members] = xi * self.w[members]
+        s = sweep(self.J, self.J_0, self.subject, self.gradient, Probe("", v), self.h)
+        off = s.off_central if s.two_sided else s.off_forward
+        return float(np.abs(off[0]))
+
+    def wrong(self, members: Array) -> bool:
+        return len(members) > 0 and not self.off(members) <= self.allowed
+
+    def one(self, members: Array) -> int | None:
+        """A wrong component among members that are wrong together; None where halving loses it in noise."""
+        while len(members) > 1:
+            left, right = np.array_split(members, 2)
+            if self.J.left() < 4:
+                return None
+            if self.wrong(left):
+                members = left
+            elif self.wrong(right):
+                members = right
+            else:
+                return None
+        return int(members[0])
+
+    def measure(self, i: int) -> Worst | None:
+        """The component by differences; None where it agrees after all."""
+        (probe,) = components(self.subject, [i])
+        s = sweep(self.J, self.J_0, self.subject, self.gradient, probe, self.h * AROUND)
+        reading = Reading(s, self.plateau.noise, self.plateau.size, self.plateau.accepted)
+        return wrong_component(reading, self.subject) if reading.says == "plateau" else None
+
+
+def locate(search: Search, known: Sequence[Reading]) -> Located:
+    """Find wrong components; `known` are readings of components that were looked at anyway."""
+    worst = [wrong_component(r, search.subject) for r in known if r.says == "plateau"]
+    n_p = len(search.gradient)
+    if len(worst) == len(known) >= 3:
+        return _sorted(worst, everywhere=True)
+    looked_at = [r.sweep.probe.index for r in known if r.sweep.probe.index is not None]
+    if len(looked_at) == n_p:
+        return _sorted(worst, others_right=True)
+    for w in worst:
+        search.gradient[w.index] = w.found
+    others = np.setdiff1d(np.arange(n_p), looked_at)
+    while len(worst) < MOST + len(known):
+        if search.J.left() < 2:
+            return _sorted(worst)
+        if not search.wrong(others):
+            return _sorted(worst, others_right=True)
+        i = search.one(others)
+        found = None if i is None else search.measure(i)
+        if found is None:
+            return _sorted(worst)
+        worst.append(found)
+        search.gradient[found.index] = found.found
+        others = np.setdiff1d(others, [found.index])
+    return _sorted(worst, everywhere=True)
+
+
+def wrong_component(reading: Reading, subject: Subject) -> Worst:
+    i, quotient = reading.sweep.probe.index, reading.quotient
+    assert i is not None
+    assert quotient is not None
+    w = float(subject.natural[i])
+    return Worst(subject.label(i), i, reading.slope / w, quotient / w)
+
+
+def _sorted(worst: list[Worst], **how: bool) -> Located:
+    return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), **how)

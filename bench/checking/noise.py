@@ -1,0 +1,31 @@
+"""The noise of an objective, from values it has already given."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bench.checking.probe import Sweep
+from problems.problem import Array
+
+WINDOW = 5  # steps whose median second difference is taken: one dead or lucky point decides nothing
+NORMAL = 0.6745  # median of |x| for x standard normal
+REPRESENTABLE = 0.29  # standard deviation of rounding to the nearest number, in eps
+
+
+def noise(sweep: Sweep, eps: float, repeated: Array) -> float:
+    """Standard deviation of one evaluation of J near p.
+
+    The second difference J(p + h) - 2 J(p) + J(p - h) is truncation where h is large and has the variance 6 sigma^2
+    where it is small (Hamming 1973, chapter 6; More & Wild 2011): the least of its running medians counts, or what
+    `repeated` evaluations at p scatter by, or the spacing of floating-point numbers at J, if that is more.
+    """
+    second = np.abs(sweep.jump * sweep.h)
+    if not sweep.two_sided:  # a step is lost to the slope, which the gradient predicts
+        second = np.abs(sweep.off_forward * sweep.h) * np.sqrt(3.0)
+    visible = second[np.isfinite(second)]
+    count = min(WINDOW, len(visible))
+    medians = [np.median(visible[k : k + count]) for k in range(len(visible) - count + 1)] if count > 2 else [0.0]
+    scatter = float(np.std(repeated, ddof=1)) if len(repeated) > 1 else 0.0
+    return max(float(min(medians)) / (NORMAL * math.sqrt(6.0)), scatter, REPRESENTABLE * eps * abs(sweep.J))

@@ -1,0 +1,142 @@
+"""What the quotients on one line say of a gradient: it agrees, it is off by so much, or they cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from bench.checking.curve import Curve, fit
+from bench.checking.plateau import DIFFERENT, Level, level
+from bench.checking.probe import Sweep
+from problems.problem import Array
+
+Says = Literal["agrees", "plateau", "kink", "noise", "nothing"]
+RESOLVED = 1e-3  # relative uncertainty of a quotient that can judge anything
+ZERO = 1e3 * float(np.finfo(np.float64).eps)  # of J, a slope that is rounding
+TINY = 1e-6  # relative jump of one-sided quotients that is no kink worth the name
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A sweep read against a gradient.
+
+    noise    standard deviation of J
+    size     |g w|_2, what slopes along natural changes are to be compared with
+    accepted relative error that is none: of the gradient's precision or nature
+    changes  step -> how often the active set changes inside its stencil, where the subject knows
+    """
+
+    sweep: Sweep
+    noise: float
+    size: float
+    accepted: float
+    changes: Callable[[float], int] | None = None
+
+    @cached_property
+    def level(self) -> Level | None:
+        """Of quotient less slope: where its value is zero within its uncertainty, the gradient is right."""
+        s = self.sweep
+        q, noise = (s.off_central, self.noise / np.sqrt(2.0)) if s.two_sided else (s.off_forward, 1.5 * self.noise)
+        return level(s.h, q, noise, RESOLVED * self.size)
+
+    @cached_property
+    def slope(self) -> float:
+        """g . v, as the gradient says."""
+        slopes = np.concatenate([self.sweep.s_plus, self.sweep.s_minus])
+        known = slopes[np.isfinite(slopes)]
+        return float(np.median(known)) if known.size else float("nan")
+
+    @property
+    def quotient(self) -> float | None:
+        """The slope that differences give."""
+        return None if self.level is None else self.slope + self.level.value
+
+    @cached_property
+    def scale(self) -> float:
+        """What errors are relative to: a component's own slope where differences resolve it, else the gradient's.
+
+        A random direction may meet a gradient at any angle: its errors are always relative to the gradient. Where that
+        is zero up to rounding in J, they are relative to J.
+        """
+        own = abs(self.slope) if self.quotient is None else max(abs(self.slope), abs(self.quotient))
+        known = self.level is not None and self.level.uncertainty <= RESOLVED * own
+        if known and self.sweep.probe.index is not None:
+            return own
+        whole, J = max(self.size, own), abs(self.sweep.J)
+        return whole if whole > ZERO * J else J
+
+    @property
+    def own_scale(self) -> bool:
+        """Whether that is a component's own slope."""
+        return self.sweep.probe.index is not None and self.scale < self.size
+
+    @property
+    def off(self) -> float:
+        """|quotient - slope| / scale at the level."""
+        assert self.level is not None
+        return abs(self.level.value) / self.scale if self.scale else 0.0
+
+    @property
+    def known_to(self) -> float:
+        """Uncertainty of that."""
+        assert self.level is not None
+        return self.level.uncertainty / self.scale if self.scale else 0.0
+
+    @cached_property
+    def kink(self) -> float | None:
+        """The jump between one-sided slopes, relative; None where there is none."""
+        if not self.sweep.two_sided:
+            return None
+        found = level(self.sweep.h, self.sweep.jump, np.sqrt(6.0) * self.noise, RESOLVED * self.size)
+        if found is None or abs(found.value) <= max(DIFFERENT * found.uncertainty, TINY * self.scale):
+            return None
+        return abs(found.value) / self.scale
+
+    @cached_property
+    def inside(self) -> int | None:
+        """Changes of the active set inside the stencil that the level rests on."""
+        if self.changes is None or self.level is None:
+            return None
+        return self.changes(self.level.h_min)
+
+    @cached_property
+    def says(self) -> Says:
+        if self.level is None:
+            return "nothing"
+        if self.kink is not None or self.inside:
+            return "kink"
+        if self.off > max(DIFFERENT * self.known_to, self.accepted):
+            return "plateau"
+        return "agrees" if self.known_to <= RESOLVED else "noise"
+
+    # --- the curves a person looks at
+
+    def errors(self, central: bool) -> Array:
+        """Relative errors (m,) of the quotients: of the gradient; on a plateau, of the level instead."""
+        off = self.sweep.off_central if central else self.sweep.off_forward
+        if self.says == "plateau" and self.level is not None:
+            off = off - self.level.value
+        return np.asarray(np.abs(off) / (self.scale or 1.0))
+
+    @cached_property
+    def central(self) -> Curve:
+        return fit(self.sweep.h, self.errors(central=True))
+
+    @cached_property
+    def one_sided(self) -> Curve:
+        return fit(self.sweep.h, self.errors(central=False))
+
+
+def stencil_changes(active_set: Callable[[Array], Hashable], p: Array, v: Array) -> Callable[[float], int]:
+    """step -> changes of the active set from p - h v over p to p + h v; points where it raises count as no change."""
+
+    def changes(h: float) -> int:
+        sets = [active_set(p + t * h * v) for t in (-1.0, 0.0, 1.0)]
+        return sum(a != b for a, b in pairwise(sets))
+
+    return changes

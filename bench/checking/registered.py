@@ -1,0 +1,112 @@
+"""A registered problem and route as the subject of a check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from bench.checking.factors import Factors, assembly
+from bench.checking.finding import Finding
+from bench.checking.subject import Subject
+from bench.slopes import complex_slopes
+from problems.errors import InputError, RoutesError
+from problems.problem import Array, Offers, Problem
+from routes.model import Model
+from routes.newton import Solver
+from routes.route import Options, Result, Route
+from routes.twin import with_synthetic_data
+
+TIGHT = Solver(rtol=1e-14)  # of complex steps: a judge is no fellow of the judged
+
+
+def subject(problem: Problem, route: Route, options: Options, p: Array, solver: Solver) -> Subject:
+    """J by forward solves from scratch, dJ/dp by the route. Raises InputError where the route cannot run on it."""
+    objection = route.objection(problem, **options)
+    if objection is not None:
+        raise InputError(f"check: {objection} - choose another route or problem")
+    parameters, model = problem.parameters, Model(problem, solver)
+    returned: list[Result] = []
+    lower, upper = (np.broadcast_to(bound, p.shape) for bound in (parameters.lower, parameters.upper))
+    offers = problem.offers
+
+    def gradient(p: Array) -> Array:
+        returned[:] = [route.prepare(model, p, **options)(p)]
+        return returned[0].gradient
+
+    return Subject(
+        name=f"{route.name} on {problem.name}",
+        objective=_counted(model),
+        gradient=gradient,
+        p=p,
+        scale=parameters.scale,
+        lower=lower,
+        upper=upper,
+        closed=False,
+        label=parameters.label,
+        position=parameters.position,
+        tighten=lambda factor: subject(problem, route, _more(options), p, _tighter(solver, factor)),
+        active_set=_active_set(problem, solver),
+        refine=_refined(problem, route, options, solver),
+        slopes=(lambda V: complex_slopes(Model(problem, TIGHT), p, V)) if Offers.COMPLEX in offers else None,
+        explain=(lambda g: explain(model, returned[0], p, g)) if Offers.LINEARIZE in offers else None,
+        accuracy=route.accuracy,
+    )
+
+
+def _counted(model: Model) -> Callable[[Array], float]:
+    return lambda q: model.value(q)
+
+
+def _tighter(solver: Solver, factor: float) -> Solver:
+    return replace(solver, rtol=solver.rtol * factor)
+
+
+def _more(options: Options) -> Options:
+    """An iterate's gradient comes nearer the solution's with more iterations, not with a tolerance."""
+    k = options.get("iterations")
+    return options if k is None else options | {"iterations": 2 * k}
+
+
+def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable] | None:
+    """Of the state at p; None where the problem has none."""
+    if Offers.SOLVE not in problem.offers or type(problem).active_set is Problem.active_set:
+        return None
+    model = Model(problem, solver)
+
+    def active_set(q: Array) -> Hashable:
+        try:
+            return problem.active_set(model.solve(q).u, q)
+        except RoutesError:
+            return None
+
+    return active_set
+
+
+def _refined(problem: Problem, route: Route, options: Options, solver: Solver) -> Callable[[], Subject | None] | None:
+    """The route on the problem with half the mesh size, at its own start."""
+    if type(problem).refined is Problem.refined:
+        return None
+
+    def refine() -> Subject | None:
+        finer = problem.refined()
+        if finer is None:
+            return None
+        finer = with_synthetic_data(finer)
+        return subject(finer, route, options, finer.parameters.start.copy(), solver)
+
+    return refine
+
+
+def explain(model: Model, result: Result, p: Array, gradient: Array) -> list[Finding]:
+    """The error budget, at the state the route returned, or at one solved for."""
+    problem = model.problem
+    u: Any = result.u
+    try:
+        if u is None:
+            u = model.solve(p).u
+        return [*assembly(model, result, p, gradient), *Factors(problem, np.asarray(u), p).findings()]
+    except RoutesError as failure:
+        return [Finding("error budget", float("nan"), 0.0, str(failure))]

@@ -1,0 +1,69 @@
+"""Objects of other people's files: `FILE.py:NAME` or `package.module:NAME`."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from bench.suggest import did_you_mean
+from problems.errors import InputError
+
+
+def is_reference(text: str) -> bool:
+    """Whether `text` points into a file or module rather than into the registry."""
+    return ":" in text
+
+
+def imported(text: str) -> Any:
+    """The object that `text` points to. Raises InputError for what cannot be found or imported."""
+    where, _, name = text.rpartition(":")
+    if not where or not name:
+        raise InputError(f"'{text}' - write FILE.py:NAME or package.module:NAME")
+    module = _module(where, text)
+    found: Any = module
+    for part in name.split("."):
+        known = [n for n in vars(found) if not n.startswith("_")] if hasattr(found, "__dict__") else []
+        if part not in known and not hasattr(found, part):
+            raise InputError(f"'{text}': {where} has no '{part}' - {did_you_mean(part, known) or 'it defines nothing'}")
+        found = getattr(found, part)
+    return found
+
+
+def _module(where: str, text: str) -> ModuleType:
+    path = Path(where)
+    if path.suffix != ".py":
+        return _loaded(lambda: importlib.import_module(where), text)
+    if not path.is_file():
+        raise InputError(f"'{text}': no file {where} here - check the path")
+    name = f"_routes_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    loader = spec.loader
+
+    def load() -> ModuleType:
+        sys.modules[name] = module  # dataclasses and pickles look themselves up there
+        loader.exec_module(module)
+        return module
+
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)  # what stands beside the file can be imported by it
+    return _loaded(load, text)
+
+
+def _loaded(load: Any, text: str) -> ModuleType:
+    from contextlib import redirect_stdout
+
+    try:
+        with redirect_stdout(sys.stderr):
+            module: ModuleType = load()
+    except (Exception, SystemExit) as error:  # code of others may raise anything while it is imported
+        said = " ".join(str(error).split())
+        raise InputError(f"'{text}' cannot be imported: {type(error).__name__}: {said} - mend it") from error
+    return module

@@ -1,0 +1,92 @@
+"""The adjoint method with one mistake in it, to see who notices: mistakes that people have made, and published."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from problems.errors import InputError, NotOffered
+from problems.problem import Array, Linearization, Problem
+from routes.forward_work import ForwardWork
+from routes.model import Model
+from routes.newton import State
+from routes.refinement import LinearizedSolver, work
+from routes.route import Offers, Result, Work, route
+
+Fault = Annotated[
+    Literal["sign", "factor", "transpose", "missing-term", "stale", "loose", "functional", "otd", "scale"],
+    "sign of lam dropped; dR/dp of one component doubled; R_u for R_u^T; J_p dropped; factors of the Newton step"
+    " before; forward solve at 1e8 times the tolerance; gradient of the integral that J is a sum for; adjoint"
+    " equation discretized on its own; chain rule of p = log(...) forgotten",
+]
+Component = Annotated[int | None, "of fault=factor, counted from 1 [the most sensitive]"]
+LOOSE = 1e8  # times the forward tolerance: 1e-4 by default
+
+
+def cost(n_p: int, forward: ForwardWork, *, fault: str, component: int | None) -> Work:
+    if fault == "otd":
+        return forward.cold + Work(factorizations=1, solves=1)
+    if fault == "loose" and forward.counted is not None:
+        return forward.counted  # how many steps a looser tolerance saves is known when they are counted
+    return work(forward, 1, transposed=fault != "transpose", factors="stale" if fault == "stale" else "refined")
+
+
+def check(*, fault: str, component: int | None) -> None:
+    if component is not None and (component < 1 or fault != "factor"):
+        raise InputError(f"faulty-adjoint: component={component} - fault=factor takes one from 1, other faults none")
+
+
+def missing(problem: Problem, *, fault: str, component: int | None) -> str | None:
+    lacks = {
+        "functional": (type(problem).integral is Problem.integral, "a J that stands for an integral"),
+        "otd": (type(problem).continuous_adjoint is Problem.continuous_adjoint, "an adjoint equation of its own"),
+        "scale": (not problem.parameters.unit_of(0).startswith("log"), "parameters that are logarithms"),
+    }
+    lacking, what = lacks.get(fault, (False, ""))
+    if component is not None and component > len(problem.parameters):
+        return f"faulty-adjoint[component={component}]: {problem.name} has {len(problem.parameters)} parameters"
+    return f"faulty-adjoint[fault={fault}] needs {what}, which {problem.name} has not" if lacking else None
+
+
+@route("faulty-adjoint", needs=Offers.LINEARIZE, cost=cost, check=check, missing=missing, sound=False)
+def faulty_adjoint(model: Model, p: Array, *, fault: Fault = "sign", component: Component = None) -> Result:
+    """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p, with a mistake on purpose."""
+    if fault == "loose":
+        model = Model(model.problem, replace(model.solver, rtol=min(0.5, LOOSE * model.solver.rtol)), model.tally)
+    state = model.solve(p)
+    lin = model.linearize(state)
+    J = state.J
+    if fault == "functional":
+        J, J_u = _known(model.problem.integral(state.u, p))
+        lin = replace(lin, J_u=J_u)
+    if fault == "otd":
+        A, Q = _known(model.problem.continuous_adjoint(state.u, p))
+        lin, lam = replace(lin, R_p=Q), model.solve_linear(model.factorize(A), -lin.J_u)
+    else:
+        lam = _adjoint_state(model, state, lin, fault)
+    gradient = lin.J_p + lin.R_p.T @ lam
+    match fault:
+        case "sign":
+            gradient = lin.J_p - lin.R_p.T @ lam
+        case "missing-term":
+            gradient = gradient - lin.J_p
+        case "factor":
+            data_term = gradient - lin.J_p
+            i = int(np.abs(data_term).argmax()) if component is None else component - 1
+            gradient[i] += data_term[i]
+        case "scale":
+            gradient = gradient / np.exp(p)
+    return Result(J, gradient, state.u, state.residual, lam)
+
+
+def _adjoint_state(model: Model, state: State, lin: Linearization, fault: str) -> Array:
+    R_u = LinearizedSolver(model, state, "stale" if fault == "stale" else "refined")
+    return R_u.solve(-lin.J_u) if fault == "transpose" else R_u.solve_transposed(-lin.J_u)
+
+
+def _known(offered: Any) -> Any:
+    if offered is None:
+        raise NotOffered("faulty-adjoint: the problem offers no such thing with these options - choose another fault")
+    return offered
