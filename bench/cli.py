@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bench.commands.check import check
 from bench.commands.shared import (
     SELECTOR,
     at_option,
@@ -27,6 +28,7 @@ from bench.commands.shared import (
     solver_of,
     store_option,
 )
+from bench.commands.vcurve import vcurve
 from problems.errors import DomainError, InputError
 
 if TYPE_CHECKING:
@@ -87,6 +89,10 @@ def main() -> None:
     routes run --problem bar --route adjoint      one gradient, its bill and its error
     routes run --problem 'bar[n=8|64]' --route all
     """
+
+
+main.add_command(vcurve)
+main.add_command(check)
 
 
 @main.command("list")

@@ -27,7 +27,7 @@ class Files:
         taken = list(taken)
         for option, path in (("--gradient", self.gradient), ("--vtu", self.vtu)):
             if path is not None:
-                _check_writable(option, path, taken)
+                check_writable(option, path, taken)
                 taken.append(path)
 
     def write(self, outcomes: Sequence[Outcome]) -> tuple[list[str], list[str]]:
@@ -65,7 +65,7 @@ def _fields(path: Path, outcomes: Sequence[Outcome]) -> str:
     return f"fields in {path}"
 
 
-def _check_writable(option: str, path: Path, taken: list[Path]) -> None:
+def check_writable(option: str, path: Path, taken: list[Path]) -> None:
     if any(path.resolve() == other.resolve() for other in taken):
         raise InputError(f"{option} {path}: is another file of this run - name one of its own")
     new = not path.exists()

@@ -8,6 +8,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Literal
 
+from bench.imported import imported, is_reference
 from bench.suggest import did_you_mean
 from problems.errors import InputError
 from routes.route import Route
@@ -17,11 +18,22 @@ BUILT_IN = "gradient-routes"
 
 
 @dataclass(frozen=True)
+class Pointer:
+    """`FILE.py:NAME` or `package.module:NAME` in place of an entry point."""
+
+    name: str
+    dist: None = None
+
+    def load(self) -> Any:
+        return imported(self.name)
+
+
+@dataclass(frozen=True)
 class Entry:
     """A registered name; `load` imports it, `failure` says why it cannot be imported (None if it can)."""
 
     kind: Kind
-    point: EntryPoint
+    point: EntryPoint | Pointer
 
     @property
     def name(self) -> str:
@@ -30,12 +42,14 @@ class Entry:
     @property
     def origin(self) -> str:
         """The distribution that registered it."""
-        return self.point.dist.name if self.point.dist else "?"
+        return self.point.dist.name if self.point.dist else self.point.name
 
     def load(self) -> Any:
         """The factory of a problem, or the Route. Raises InputError with the reason if that fails."""
         try:
             target = self.point.load()
+        except InputError:
+            raise
         except (Exception, SystemExit) as error:  # a plug-in may raise anything while it is imported
             said = " ".join(str(error).split())
             raise InputError(
@@ -44,7 +58,7 @@ class Entry:
             ) from error
         if self.kind == "route" and not isinstance(target, Route):
             raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
-        if self.kind == "route" and target.name != self.name:
+        if self.kind == "route" and isinstance(self.point, EntryPoint) and target.name != self.name:
             raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
         if self.kind == "problem" and not callable(target):
             raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
@@ -97,7 +111,9 @@ ORDER = (
 
 
 def find(kind: Kind, name: str) -> Entry:
-    """The entry of that name. Raises InputError with the nearest name."""
+    """The entry of that name, or what `FILE.py:NAME` points to. Raises InputError with the nearest name."""
+    if is_reference(name):
+        return Entry(kind, Pointer(name))
     known = entries(kind)
     if name not in known:
         raise InputError(f"no {kind} '{name}' - {did_you_mean(name, known)}")

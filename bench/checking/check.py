@@ -89,7 +89,9 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading, findings: tupl
     located = _located(seen, worst)
     so_far = replace(so_far, located=located)
     if convicted is not None:
-        return on_plateau(replace(so_far, culprit=convicted.culprit), "wrong-gradient")
+        so_far = replace(so_far, culprit=convicted.culprit)
+        if not convicted.by_mesh:
+            return on_plateau(so_far, "wrong-gradient")
     refined = _refined(seen, worst)
     so_far = replace(so_far, refined=refined)
     if refined is not None and refined.order >= settle.SHRINKS and not _local(located):

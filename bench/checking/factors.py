@@ -140,7 +140,8 @@ def assembly(model: Model, result: Result, p: Array, gradient: Array) -> Iterato
     yield Finding("adjoint residual |R_u^T lam + J_u| / |J_u|", off, SOLVED, culprit=_adjoint(R_u, lam, lin.J_u, off))
     product = np.asarray(lin.R_p.T @ lam)
     off = relative(gradient, lin.J_p + product)
-    yield Finding("gradient against J_p + R_p^T lam", off, SOLVED, culprit=_product(problem, p, gradient, lin, product))
+    culprit, by_mesh = _product(problem, p, gradient, lin, product)
+    yield Finding("gradient against J_p + R_p^T lam", off, SOLVED, culprit=culprit, by_mesh=by_mesh)
 
 
 def _adjoint(R_u: object, lam: Array, J_u: Array, off: float) -> str | None:
@@ -155,24 +156,28 @@ def _adjoint(R_u: object, lam: Array, J_u: Array, off: float) -> str | None:
     return None
 
 
-def _product(problem: Problem, p: Array, gradient: Array, lin: Linearization, product: Array) -> str | None:
-    """Which mistake makes the gradient other than J_p + R_p^T lam."""
+def _product(
+    problem: Problem, p: Array, gradient: Array, lin: Linearization, product: Array
+) -> tuple[str | None, bool]:
+    """Which mistake makes the gradient other than J_p + R_p^T lam; whether it may be one of the discretization."""
     right, size = lin.J_p + product, float(np.linalg.norm(lin.J_p + product)) or 1.0
     if float(np.linalg.norm(gradient - right)) <= SOLVED * size:
-        return None
+        return None, False
     if relative(gradient, product) <= SOLVED:
-        return "a missing term: J_p was dropped"
+        return "a missing term: J_p was dropped", False
     if relative(gradient, lin.J_p - product) <= SOLVED:
-        return "the sign of lam"
+        return "the sign of lam", False
     wrong = np.flatnonzero(np.abs(gradient - right) > SOLVED * size)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = (gradient / right)[wrong]
         by_scale = ratio / np.exp(-p[wrong])
     if _one(by_scale) and abs(float(np.median(by_scale)) - 1.0) <= ALIKE:
-        return "the chain rule of p = log(...): dJ/dp was left as dJ/dexp(p)"
+        return "the chain rule of p = log(...): dJ/dp was left as dJ/dexp(p)", False
     names = ", ".join(problem.parameters.label(int(i)) for i in wrong[:3])
     what = f"dR/dp, parameter {names}" if len(wrong) <= 3 else f"dR/dp, {len(wrong)} parameters, {names} among them"
-    return f"{what}, off by the factor {float(np.median(ratio)):.3g}" if _one(ratio) else what
+    if _one(ratio):
+        return f"{what}, off by the factor {float(np.median(ratio)):.3g}", False
+    return what, len(wrong) > 3
 
 
 def _one(values: Array) -> bool:

@@ -12,7 +12,7 @@ class Finding:
 
     Both are relative errors where nothing else is said.
     says     in words, where there is something to say
-    culprit  the factor it convicts, where it does
+    culprit  the factor it convicts, where it does; by_mesh: unless that shrinks with the mesh size
     """
 
     name: str
@@ -20,6 +20,7 @@ class Finding:
     limit: float
     says: str = ""
     culprit: str | None = None
+    by_mesh: bool = False
 
     @property
     def sound(self) -> bool | None:

@@ -26,9 +26,8 @@ def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
     both = getattr(thing, "value_and_gradient", None)
     objective, gradient = getattr(thing, "objective", None), getattr(thing, "gradient", None)
     if callable(both):
-        value_and_gradient = Both(both)
-        objective = objective if callable(objective) else value_and_gradient.value
-        gradient = gradient if callable(gradient) else value_and_gradient.gradient
+        objective = objective if callable(objective) else (lambda p: both(p)[0])
+        gradient = gradient if callable(gradient) else (lambda p: both(p)[1])
     if not callable(objective) or not callable(gradient):
         raise InputError(
             f"check: {name} has no objective(p) and gradient(p), nor value_and_gradient(p) - it has"
@@ -86,24 +85,6 @@ def subject(
         raise InputError(f"check: {len(names)} names for {n_p} parameters - give one each")
     label = default_label if names is None else (lambda i: str(names[i]))
     return Subject(name, objective, gradient, p, s, lower, upper, True, label, None, tighten, active_set)
-
-
-class Both:
-    """value_and_gradient(p) as two functions; the last point is kept, so that asking for both costs one call."""
-
-    def __init__(self, both: Callable[[Array], Any]) -> None:
-        self._both = both
-        self._last: tuple[bytes, Any] | None = None
-
-    def _at(self, p: Array) -> tuple[Any, Any]:
-        value, gradient = self._both(p)
-        return value, gradient
-
-    def value(self, p: Array) -> Any:
-        return self._at(p)[0]
-
-    def gradient(self, p: Array) -> Any:
-        return self._at(p)[1]
 
 
 def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:

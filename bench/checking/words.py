@@ -89,7 +89,7 @@ def on_plateau(check: Check, verdict: Verdict) -> Check:
         says += f"; on a mesh of half the size {check.refined.after:.2g}, before {check.refined.before:.2g}"
         says += f": it shrinks like h^{check.refined.order:.1f}"
         todo = "differentiate what is computed: discretize first, then optimize"
-        return replace(check, verdict=verdict, says=says, todo=todo, culprit=culprit or "adjoint discretized by itself")
+        return replace(check, verdict=verdict, says=says, todo=todo, culprit="an adjoint discretized on its own")
     if check.tightened:
         says += f", does not fall when the forward solve is tightened by {check.tightened[-1].factor:g}"
     if check.refined is not None:

@@ -1,0 +1,162 @@
+"""`routes check`: is this gradient right? For anyone's code, a registered problem and route, or a contract."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bench.commands.shared import (
+    at_option,
+    debug_option,
+    linear_solver_option,
+    max_steps_option,
+    newton_option,
+    no_store_option,
+    rtol_option,
+    solver_of,
+    store_option,
+)
+from bench.commands.verdict import built, conclude, now, one_problem, one_route, writable
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from bench.checking.subject import Subject
+    from routes.factorization import LinearSolver
+    from routes.newton import Newton, Solver
+
+ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
+
+
+@click.command()
+@click.argument("target", required=False, metavar="[FILE.py:NAME]")
+@click.option("--objective", metavar="FILE.py:NAME", help="A function J(p), in place of an object that has one.")
+@click.option("--gradient", metavar="FILE.py:NAME", help="A function dJ/dp(p) -> (n_p,), beside --objective.")
+@click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract.")
+@click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract.")
+@at_option
+@click.option("--budget", type=float, default=200.0, show_default=True, help="Objective calls at most.")
+@click.option("--accept", type=float, default=0.0, metavar="ERROR", help=ACCEPT)
+@rtol_option
+@max_steps_option
+@linear_solver_option
+@newton_option
+@click.option("--seed", type=int, default=0, show_default=True, help="Of random directions.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
+@click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
+@store_option
+@no_store_option
+@debug_option
+def check(
+    target: str | None,
+    objective: str | None,
+    gradient: str | None,
+    problem: str | None,
+    route: str | None,
+    at: str,
+    budget: float,
+    accept: float,
+    rtol: float,
+    max_steps: int,
+    linear_solver: LinearSolver,
+    newton: Newton,
+    seed: int,
+    as_json: bool,
+    html: Path | None,
+    store: Path,
+    no_store: bool,
+) -> None:
+    """Is this gradient right, and if not, why?
+
+    \b
+    routes check my_model.py:Model                an object with objective(p), gradient(p) and start
+    routes check --objective m.py:J --gradient m.py:dJ --at p.csv
+    routes check --problem block --route adjoint
+    routes check --problem my_problem.py:Spring   the contract: shapes, derivatives, transposes, work
+
+    The object may offer value_and_gradient(p) instead, and scale, bounds, names, tighten(factor), active_set(p).
+
+    Exit code: 0 agrees, 1 wrong-gradient or inconsistent-discretization, 3 inconclusive, 2 wrong usage.
+    """
+    from bench.checking.check import check as check_subject
+    from bench.checking.plan import Plan
+
+    if not 0 <= accept < 1:
+        raise InputError(f"--accept {accept:g} - give a relative error >= 0 and < 1")
+    solver, kept, started = solver_of(rtol, max_steps, linear_solver, newton), None if no_store else store, now()
+    ways = {"a target": target, "--objective": objective or gradient, "--problem or --route": problem or route}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) != 1:
+        what = f"{' and '.join(given)} given" if given else "nothing to check"
+        raise InputError(f"check: {what} - give FILE.py:NAME, or --objective and --gradient, or --problem and --route")
+    if (problem is None) != (route is None):
+        sys.exit(_contract(problem, route, at, solver, as_json))
+    plan = Plan(budget=budget, seed=seed)
+    subject = _subject(target, objective, gradient, problem, route, at, solver)
+    writable(html, kept)
+    found = check_subject(subject, plan, accept)
+    named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
+    sys.exit(conclude(found, named, as_json, html, kept, started))
+
+
+def _subject(
+    target: str | None,
+    objective: str | None,
+    gradient: str | None,
+    problem: str | None,
+    route: str | None,
+    at: str,
+    solver: Solver,
+) -> Subject:
+    from bench.checking import foreign
+    from bench.imported import imported
+
+    if problem is not None and route is not None:
+        from bench.checking.registered import subject
+
+        spec = one_route(route)
+        made, p = built(one_problem(problem), at)
+        return subject(made, spec.route, spec.options, p, solver)
+    start = None if at == "start" else _column(at)
+    if target is not None:
+        return foreign.subject_of(imported(target), target, start)
+    if objective is None or gradient is None:
+        raise InputError("check: --objective and --gradient go together - give both")
+    if start is None:
+        raise InputError("check: two functions have no start - give the point with --at FILE.csv")
+    return foreign.subject(imported(objective), imported(gradient), start, name=gradient)
+
+
+def _column(at: str) -> object:
+    from problems.tables import read_columns
+
+    columns = read_columns(at, None)
+    if len(columns) != 1:
+        raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
+    return next(iter(columns.values()))
+
+
+def _contract(problem: str | None, route: str | None, at: str, solver: Solver, as_json: bool) -> int:
+    """A problem alone with all routes, or a route alone on the bar."""
+    from bench import case
+    from bench.checking.contract import of_problem, of_route
+    from bench.rows import clean
+
+    made, p = built(one_problem(problem or "bar"), at)
+    if route is not None:
+        spec = one_route(route)
+        found = of_route(made, p, spec.route, spec.options, solver)
+    else:
+        found = of_problem(made, p, [spec.route for spec in case.routes(["all"])], solver)
+    if as_json:
+        findings = [vars(f) | {"sound": f.sound} for f in found.findings]
+        click.echo(json.dumps(clean({"name": found.name, "findings": findings}), allow_nan=False))
+    else:
+        from bench.views.tables import console
+        from bench.views.verdict import show_contract
+
+        show_contract(console(), found)
+    return 1 if found.broken else 0

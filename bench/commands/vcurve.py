@@ -1,0 +1,135 @@
+"""`routes vcurve`: difference quotients over decades of steps against a route's gradient, and a verdict."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bench.commands.shared import (
+    at_option,
+    debug_option,
+    linear_solver_option,
+    max_steps_option,
+    newton_option,
+    no_store_option,
+    rtol_option,
+    solver_of,
+    store_option,
+)
+from bench.commands.verdict import built, conclude, now, one_problem, one_route, writable
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from problems.problem import Problem
+    from routes.factorization import LinearSolver
+    from routes.newton import Newton
+
+FEW = 3  # components, where nobody says how many
+COMPONENTS = "So many components by sensitivity, or these: 2,5..7 [element min(3, M) of the bar; 3 elsewhere]."
+BUDGET = "Refuse what is predicted to take more seconds; inf forces it."
+
+
+@click.command()
+@click.option("--problem", required=True, metavar="SELECTOR", help="NAME, 'NAME[key=value]' or FILE.py:NAME.")
+@click.option("--route", required=True, metavar="SELECTOR", help="The route whose gradient is looked at.")
+@at_option
+@click.option("--components", metavar="M|LIST", help=COMPONENTS)
+@click.option("--directions", type=int, default=2, show_default=True, help="Random directions.")
+@click.option("--steps", nargs=2, type=float, default=(1e-16, 1.0), show_default=True, help="Least and largest h.")
+@click.option("--per-decade", type=int, default=4, show_default=True, help="Steps in each decade.")
+@click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
+@rtol_option
+@max_steps_option
+@linear_solver_option
+@newton_option
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the directions.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
+@click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
+@store_option
+@no_store_option
+@debug_option
+def vcurve(
+    problem: str,
+    route: str,
+    at: str,
+    components: str | None,
+    directions: int,
+    steps: tuple[float, float],
+    per_decade: int,
+    budget: float,
+    rtol: float,
+    max_steps: int,
+    linear_solver: LinearSolver,
+    newton: Newton,
+    seed: int,
+    as_json: bool,
+    html: Path | None,
+    store: Path,
+    no_store: bool,
+) -> None:
+    """Sweep finite-difference steps over decades, read the curve and say whether the gradient is right.
+
+    One-sided and central quotients along components and random directions, against the gradient of the route; on a
+    plateau the forward solve is tightened and the mesh refined. Every point is kept: `routes export --table points`.
+
+    Exit code: 0 agrees, 1 wrong-gradient or inconsistent-discretization, 3 inconclusive, 2 wrong usage.
+    """
+    from bench.checking.check import check
+    from bench.checking.plan import Plan
+    from bench.checking.registered import subject
+    from bench.timing import seconds_of
+
+    if not budget > 0:
+        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
+    kept, started = None if no_store else store, now()
+    spec, route_spec, solver = one_problem(problem), one_route(route), solver_of(rtol, max_steps, linear_solver, newton)
+    made, p = built(spec, at)
+    few = _default(made) if components is None else _components(components, len(p))
+    plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
+    looked_at = subject(made, route_spec.route, route_spec.options, p, solver)
+    _refuse_beyond(budget, seconds_of(lambda: looked_at.objective(p))[0], plan)
+    writable(html, kept)
+    found = check(looked_at, plan)
+    sys.exit(conclude(found, {"problem": problem, "route": route, "at": at}, as_json, html, kept, started))
+
+
+def _default(problem: Problem) -> int | tuple[int, ...]:
+    """Element min(3, M) of a bar whose first M nodes carry sensors: it has some behind it and some before."""
+    from problems.bar import Bar
+
+    if isinstance(problem, Bar) and problem.last_sensor:
+        return (min(3, problem.last_sensor) - 1,)
+    return FEW
+
+
+def _components(text: str, n_p: int) -> int | tuple[int, ...]:
+    """A number of components, or their numbers from 1: 2,5..7."""
+    numbers: list[int] = []
+    for item in text.split(","):
+        first, dots, last = item.strip().partition("..")
+        if not first.isdecimal() or (dots and not last.isdecimal()):
+            raise InputError(f"--components {text}: {item!r} is no number - write 3 (how many) or 2,5..7 (which)")
+        numbers += range(int(first), int(last or first) + 1)
+    if "," not in text and ".." not in text:
+        return min(numbers[0], n_p)
+    outside = [i for i in numbers if not 1 <= i <= n_p]
+    if outside or not numbers:
+        raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")
+    return tuple(dict.fromkeys(i - 1 for i in numbers))
+
+
+def _refuse_beyond(budget: float, seconds: float, plan: object) -> None:
+    from bench.bill import duration
+    from bench.checking.plan import Plan
+
+    assert isinstance(plan, Plan)
+    few = plan.components if isinstance(plan.components, int) else len(plan.components)
+    calls = 2 * len(plan.steps) * (few + plan.directions)
+    if calls * seconds > budget:
+        raise InputError(
+            f"vcurve: {calls} forward solves are predicted to take {duration(calls * seconds)} > --budget {budget:g} s"
+            " - take fewer by --per-decade, --components, --directions or --steps, or --budget inf"
+        )

@@ -1,0 +1,113 @@
+"""What the verbs that end in a verdict share: one problem, one route, the files and the store, the showing."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bench.commands.shared import complain
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from bench.case import ProblemSpec, RouteSpec
+    from bench.checking.result import Check
+    from problems.problem import Array, Problem
+
+
+def one_problem(selector: str) -> ProblemSpec:
+    """The one problem a selector names. Raises InputError for several."""
+    from bench import case
+
+    specs = case.problems([selector])
+    if len(specs) != 1:
+        raise InputError(f"--problem {selector}: names {len(specs)} problems - name one")
+    return specs[0]
+
+
+def one_route(selector: str) -> RouteSpec:
+    """The one route a selector names. Raises InputError for several."""
+    from bench import case
+
+    specs = case.routes([selector])
+    if len(specs) != 1:
+        raise InputError(f"--route {selector}: names {len(specs)} routes - name one")
+    return specs[0]
+
+
+def built(spec: ProblemSpec, at: str) -> tuple[Problem, Array]:
+    """The problem and the point p. Raises InputError for a factory that fails in its own way."""
+    from bench import case
+
+    try:
+        problem = spec()
+    except (TypeError, ValueError, ArithmeticError, LookupError, AttributeError) as error:
+        raise InputError(f"problem '{spec.name}' cannot be built: {type(error).__name__}: {error} - mend it") from error
+    return problem, case.point(problem, at)
+
+
+def writable(html: Path | None, store: Path | None) -> None:
+    """Raise InputError now rather than after all is measured."""
+    from bench.files import check_writable
+    from bench.store import Store
+
+    if html is not None:
+        check_writable("--html", html, [] if store is None else [store])
+    if store is not None:
+        Store(store).check_writable()
+
+
+def keep(check: Check, what: dict[str, Any], store: Path | None, started: str) -> str | None:
+    """Rows of the check into the store; a sentence where they are lost."""
+    from bench.checking.rows import rows
+    from bench.store import Store
+
+    if store is None:
+        return None
+    try:
+        Store(store).append_study(rows(check, what), started)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def finish(check: Check, as_json: bool, html: Path | None, kept: Path | None) -> None:
+    """Print the verdict, or one JSON object; write the page."""
+    from bench.rows import clean
+
+    if as_json:
+        click.echo(json.dumps(clean(check.as_dict()), allow_nan=False))
+    else:
+        from bench.views.tables import console
+        from bench.views.verdict import show_check
+
+        out = console()
+        show_check(out, check)
+        if kept is not None:
+            out.print(f"kept in {kept}", style="dim", soft_wrap=True)
+    if html is not None:
+        from bench.views.page import page
+
+        try:
+            html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
+        except OSError as error:
+            raise InputError(f"--html {html}: {error.strerror or error} - name a file you may write") from error
+        click.echo(f"page in {html}", err=as_json)
+
+
+def conclude(
+    check: Check, what: dict[str, Any], as_json: bool, html: Path | None, store: Path | None, started: str
+) -> int:
+    """Keep, show, and the exit code: what could not be kept is said after what was found."""
+    lost = keep(check, what, store, started)
+    finish(check, as_json, html, None if lost else store)
+    if lost is not None:
+        complain(f"not kept: {lost}")
+    return check.exit_code
+
+
+def now() -> str:
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")

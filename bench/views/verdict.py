@@ -1,0 +1,128 @@
+"""A check for a person: the verdict, its curves, its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from bench.checking.contract import Contract
+from bench.checking.finding import Finding
+from bench.checking.reading import Reading
+from bench.checking.result import Check
+from bench.views.format import number
+from bench.views.plot import Series, plot
+from bench.views.tables import show
+
+STYLES = {
+    "agrees": "bold green",
+    "wrong-gradient": "bold red",
+    "inconsistent-discretization": "bold red",
+}
+INCONCLUSIVE = "bold yellow"
+MARKS = {True: "ok", False: "NO", None: "?"}
+
+
+def show_check(out: Console, check: Check, curves: bool = True) -> None:
+    """The sentence first; then what it rests on."""
+    style = STYLES.get(check.verdict, INCONCLUSIVE)
+    wrap = not out.is_terminal
+    out.print(Text.assemble((check.name, "bold"), ": ", (check.verdict, style)), soft_wrap=wrap)
+    out.print(Text(check.says), soft_wrap=wrap)
+    out.print(Text.assemble(("next: ", "bold"), check.todo), soft_wrap=wrap)
+    if check.readings:
+        out.print()
+        show(out, lines(check))
+    if curves and check.deciding is not None:
+        out.print()
+        out.print(curve(check, check.deciding, out.width))
+    if check.findings:
+        out.print()
+        show(out, evidence(check.findings))
+    if check.readings:
+        out.print()
+    for remark in check.remarks:
+        out.print(Text(f"note: {remark}", style="italic"), soft_wrap=wrap)
+    out.print(Text(f"{check.calls} objective calls, {check.gradients} gradient", style="dim"), soft_wrap=wrap)
+
+
+def lines(check: Check) -> Table:
+    """One row a line: what its quotients say, in numbers."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("line", overflow="fold", min_width=12)
+    table.add_column("says", no_wrap=True)
+    names = ("off by", "known to", "slope 1-sided", "slope central", "floor", "best step", "decades")
+    for name in names:
+        table.add_column(name, justify="right", no_wrap=name != "decades")
+    table.add_column("relative to", overflow="fold")
+    for reading in check.readings:
+        table.add_row(*_cells(reading.sweep.probe.name, reading))
+    for t in check.tightened:
+        table.add_row(*_cells(f"{t.reading.sweep.probe.name}, tightened x {t.factor:g}", t.reading), style="dim")
+    return table
+
+
+def _cells(name: str, reading: Reading) -> list[Text]:
+    known = reading.level is not None
+    curve = reading.central if reading.sweep.two_sided else reading.one_sided
+    cells = [
+        name,
+        reading.says,
+        number(reading.off, 2) if known else "",
+        number(reading.known_to, 2) if known else "",
+        number(reading.one_sided.slope, 3),
+        number(reading.central.slope, 3),
+        number(curve.floor, 2),
+        number(curve.best_step, 2),
+        number(curve.window, 2),
+        "itself" if reading.own_scale or len(reading.sweep.probe.v) == 1 else "gradient",
+    ]
+    return [Text(cell) for cell in cells]
+
+
+def curve(check: Check, reading: Reading, width: int) -> Text:
+    """The V-curve of one line, tightened ones beside it, and the noise that J itself predicts."""
+    made, scale = reading.sweep, reading.scale or 1.0
+    h = made.h.tolist()
+    series = [
+        Series("one-sided", h, (np.abs(made.off_forward) / scale).tolist(), "1", "#E69F00"),
+        Series("central", h, (np.abs(made.off_central) / scale).tolist(), "2", "#D55E00"),
+    ]
+    for k, t in enumerate(check.tightened):
+        other = t.reading.sweep
+        errors = (np.abs(other.off_central if other.two_sided else other.off_forward) / scale).tolist()
+        series.append(Series(f"tightened x {t.factor:g}", other.h.tolist(), errors, "tuv"[k], "#0072B2"))
+    if reading.noise:
+        predicted = reading.noise / (np.sqrt(2.0) * made.h) / scale
+        shown = np.where(predicted <= 1.0, predicted, np.nan)
+        series.append(Series("noise of J over h", h, shown.tolist(), ".", "dim"))
+    title = f"error of quotients along {made.probe.name}, relative"
+    return Text(f"{title}\n", style="bold") + plot(series, "h", "error", width)
+
+
+def evidence(findings: Sequence[Finding]) -> Table:
+    """Evidence test by test."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("evidence", overflow="fold", min_width=20)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("limit", justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    table.add_column("", overflow="fold")
+    for f in findings:
+        value = "" if np.isnan(f.value) else f"{f.value:.1e}"
+        style = {True: "", False: "red", None: "dim"}[f.sound]
+        said = "; ".join(filter(None, (f.says, f.culprit)))
+        table.add_row(Text(f.name), value, f"{f.limit:.0e}", Text(MARKS[f.sound], style=style), Text(said), style=style)
+    return table
+
+
+def show_contract(out: Console, contract: Contract) -> None:
+    """All findings on a problem or route, and how many promises are broken."""
+    broken = len(contract.broken)
+    said = f"{broken} of {len(contract.findings)} promises broken" if broken else "keeps the contract"
+    out.print(Text.assemble((contract.name, "bold"), ": ", (said, "bold red" if broken else "bold green")))
+    out.print()
+    show(out, evidence(contract.findings))
