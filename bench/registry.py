@@ -99,6 +99,7 @@ def entries(kind: Kind) -> dict[str, Entry]:
 ORDER = (
     "bar",
     "block",
+    "advection",
     "fd-one-sided",
     "fd-central",
     "complex-step",

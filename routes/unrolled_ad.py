@@ -14,7 +14,7 @@ from routes.route import Affordable, ForwardWork, Gradient, Offers, Options, Res
 
 Inner = Annotated[
     Literal["cg", "richardson", "jacobi", "direct"] | None,
-    "the iteration on the tape; direct: Newton steps with their factors [cg on the linear bar, direct on solids]",
+    "the iteration on the tape; direct: Newton steps with their factors [cg on the linear bar, direct on others]",
 ]
 Iterations = Annotated[int | None, "k, a Newton step's; direct: Newton steps [what the forward tolerance needs at p]"]
 NewtonSteps = Annotated[int | None, "Newton steps around them [1 on linear problems, else as the forward solve]"]
@@ -47,7 +47,8 @@ def check(*, inner: str | None, iterations: int | None, newton: int | None, chec
 
 
 def chosen(problem: Problem, inner: str | None) -> str:
-    return inner or ("cg" if problem.linear and not problem.matrix_free else "direct")
+    by_cg = problem.linear and problem.structure == "spd" and not problem.matrix_free
+    return inner or ("cg" if by_cg else "direct")
 
 
 def missing(

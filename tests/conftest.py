@@ -24,6 +24,7 @@ from click.testing import CliRunner
 from duffing.problem import Duffing
 
 from bench.cli import main
+from problems.advection import Advection
 from problems.bar import Bar
 from problems.block import Block
 from problems.problem import Array, Problem
@@ -57,13 +58,19 @@ BARS = {
     "bar[sensors]": {"n": 12, "sensors": [2, 3, 7]},
     "bar[noise]": {"n": 21, "sensors": 21, "noise": 0.01, "seed": 4},
 }
+ADVECTIONS = {
+    "advection": {"n": 4},
+    "advection[source]": {"n": 3, "unknown": "source", "angle": 200.0, "sensors": "everywhere"},
+    "advection[raw,alpha]": {"n": 3, "parametrization": "raw", "kappa": 1.0, "alpha": 0.3},
+}
 
 
 def zoo() -> dict[str, Problem]:
     """Every registered kind of problem, in small variants."""
     bars = {name: Bar(**options) for name, options in BARS.items()}
+    advections = {name: Advection(**options) for name, options in ADVECTIONS.items()}
     follower = Block(nx=1, ny=1, nz=2, parametrization="raw", derivatives="hand", load="follower", cases=2)
-    return bars | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower}
+    return bars | advections | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower}
 
 
 def options_of(route: Route, problem: Problem) -> list[dict[str, Any]]:

@@ -49,7 +49,7 @@ def differentiate(
     route: Route, problem: Problem, p: Array, solver: Solver = TIGHT, **options
 ) -> tuple[Result, Work, Work]:
     """The result, the work counted and the work declared: on a linear problem wholly before the run, on a nonlinear
-    one given the number of Newton steps it took."""
+    one given the number of Newton steps it took; chord steps are estimated well before the run on the bar only."""
     model = Model(problem, solver)
     options = route.resolve(model, p, **route.defaults | options)
     gradient = route.prepare(model, p, **options)
@@ -57,7 +57,8 @@ def differentiate(
     result = gradient(p)
     counted = model.tally.work - before
     state = Model(problem, solver).solve(p)
-    known = None if problem.linear else counted
+    estimated = options.get("start") == "chord" and not isinstance(problem, Bar)
+    known = counted if estimated or not problem.linear else None
     forward = ForwardWork(state.work, problem.linear, model.solver.rtol, known, problem.matrix_free, model.inexact)
     return result, counted, route.cost(len(p), forward, **options)
 
