@@ -20,7 +20,7 @@ from bench.checking.subject import Subject
 from bench.checking.words import on_agreement, on_kink, on_noise, on_plateau, on_unusable, remarks, undetermined
 from problems.errors import RoutesError
 
-SMALL = 1e-3  # a plateau below may be a loosely solved J: solvers are seldom looser
+SMALL = 1e-2  # a plateau below may be a loosely solved J: solvers are seldom looser
 
 
 def check(subject: Subject, plan: Plan, accepted: float = 0.0) -> Check:
@@ -63,8 +63,7 @@ def _judged(so_far: Check, seen: Examination) -> Check:
 
 
 def _worst(readings: list[Reading]) -> Reading:
-    """Directions before components: their errors are relative to the whole gradient."""
-    return max(readings, key=lambda r: (r.sweep.probe.index is None, r.off))
+    return max(readings, key=lambda r: r.off)
 
 
 def _clearest(readings: list[Reading]) -> Reading:
@@ -86,17 +85,16 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading, findings: tupl
     convicted = next((f for f in findings if f.culprit is not None), None)
     if tightened and settle.fell(worst, tightened[-1].reading):
         return on_plateau(replace(so_far, culprit=None if convicted is None else convicted.culprit), "solver-limited")
-    located = _located(seen, worst)
-    so_far = replace(so_far, located=located)
-    if convicted is not None:
-        so_far = replace(so_far, culprit=convicted.culprit)
-        if not convicted.by_mesh:
-            return on_plateau(so_far, "wrong-gradient")
-    refined = _refined(seen, worst)
-    so_far = replace(so_far, refined=refined)
+    by_mesh = convicted is None or convicted.by_mesh
+    refined = _refined(seen, worst) if by_mesh else None
+    located = _located(seen, seen.readings)
+    culprit = None if convicted is None else convicted.culprit
+    so_far = replace(so_far, located=located, refined=refined, culprit=culprit)
     if refined is not None and refined.order >= settle.SHRINKS and not _local(located):
         return on_plateau(so_far, "inconsistent-discretization")
-    if not tightened and worst.off < SMALL:
+    if convicted is not None:
+        return on_plateau(so_far, "wrong-gradient")
+    if not tightened and max([worst.off, *(w.off for w in located.worst if _local(located))]) < SMALL:
         return on_plateau(so_far, "undetermined")
     return on_plateau(so_far, "wrong-gradient")
 
@@ -106,9 +104,14 @@ def _local(located: Located) -> bool:
     return bool(located.worst) and located.others_right and len(located.worst) <= 4
 
 
-def _located(seen: Examination, worst: Reading) -> Located:
-    known = [r for r in seen.readings if r.sweep.probe.index is not None]
-    return locate(Search(seen.J, seen.J_0, seen.subject, seen.gradient, worst, seen.plan.seed + 1), known)
+def _located(seen: Examination, readings: list[Reading]) -> Located:
+    """By halving where a random direction shows the plateau, else among the components looked at."""
+    known = [r for r in readings if r.sweep.probe.index is not None]
+    shown = [r for r in readings if r.sweep.probe.index is None and r.says == "plateau"]
+    search = None
+    if shown:
+        search = Search(seen.J, seen.J_0, seen.subject, seen.gradient, _worst(shown), seen.plan.seed + 1)
+    return locate(search, known, seen.subject)
 
 
 def _refined(seen: Examination, worst: Reading) -> Refined | None:

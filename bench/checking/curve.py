@@ -18,7 +18,7 @@ NEIGHBOURS = 3  # points whose median is the floor: one lucky step is none
 class Curve:
     """What a V-curve shows; None where it does not show it.
 
-    floor      least relative error, of three neighbours
+    floor      least relative error, of three neighbours and not below what the noise of J predicts
     best_step  relative step there
     slope      of log error over log step on the truncation branch: 1 one-sided, 2 central
     roundoff   the same on the round-off branch: -1
@@ -32,27 +32,28 @@ class Curve:
     window: float
 
 
-def fit(h: Array, error: Array) -> Curve:
-    """Read a V-curve off relative errors (m,) at steps h (m,); NaN where there are none."""
+def fit(h: Array, error: Array, noise: float) -> Curve:
+    """Read a V-curve off relative errors (m,) at steps h (m,), NaN where there are none; `noise` / h is that of J."""
     known = np.isfinite(error)
     h, error = h[known], error[known]
     if len(h) < NEIGHBOURS:
         return Curve(None, None, None, None, 0.0)
     medians = np.array([np.median(error[k : k + NEIGHBOURS]) for k in range(len(h) - NEIGHBOURS + 1)])
-    lowest = int(medians.argmin()) + NEIGHBOURS // 2
-    floor, best = float(medians.min()), float(h[lowest])
+    middle = h[NEIGHBOURS // 2 :][: len(medians)]
+    expected = np.maximum(medians, noise / middle)  # a lucky zero at a tiny step is no floor
+    floor, best = float(expected.min()), float(middle[expected.argmin()])
     branch = (error > CLEAR * floor) & (error > 0.0) & (error < ASYMPTOTIC)
     useful = np.log10(h[error <= USEFUL])
     return Curve(
         floor,
         best,
-        _slope(h, error, branch & (h > best)),
-        _slope(h, error, branch & (h < best)),
+        slope(h, error, branch & (h > best)),
+        slope(h, error, branch & (h < best)),
         float(np.ptp(useful)) if useful.size else 0.0,
     )
 
 
-def _slope(h: Array, error: Array, branch: Array) -> float | None:
+def slope(h: Array, error: Array, branch: Array) -> float | None:
     """Median slope between all pairs of points at least half a decade apart (Theil 1950, Sen 1968)."""
     x, y = np.log10(h[branch]), np.log10(error[branch])
     i, j = np.triu_indices(len(x), 1)

@@ -6,15 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.checking.curve import fit
+from bench.checking.curve import slope
 from bench.checking.examine import Examination
 from bench.checking.finding import Finding
 from bench.checking.probe import directions
 from problems.errors import RoutesError
-from problems.problem import Array
 
 COUNT = 3  # random directions of complex steps
 COMPLEX = 1e-9  # relative: what complex steps and linearized solves of tolerance 1e-12 leave
+CLEAR, SMALL = 100.0, 0.1  # noises that a remainder has to exceed; steps from which powers of h are one power
+AT_LEAST = 4  # such steps
 RATE = 0.15  # of the rates 1 and 2 of Taylor remainders
 
 
@@ -30,13 +31,17 @@ def taylor(seen: Examination) -> Iterator[Finding]:
     """Rates of |J(p + h v) - J(p)| ~ h and |J(p + h v) - J(p) - h g.v| ~ h^2, from the first line's own points."""
     if not seen.readings:
         return
-    made = seen.readings[0].sweep
+    reading = seen.readings[0]
+    made = reading.sweep
     for order, off in ((1, made.forward), (2, made.off_forward)):
-        remainder: Array = np.abs(off * made.h)
-        rate = fit(made.h, remainder / (np.nanmax(remainder) or 1.0) if remainder.size else remainder).slope
-        if rate is not None:
-            what = "with the gradient" if order == 2 else "without it"
-            yield Finding(f"Taylor remainder {what}", abs(rate - order), RATE, f"rate {rate:.3g}, expected {order}")
+        remainder = np.abs(off * made.h)
+        clear = (remainder > CLEAR * reading.noise) & (made.h <= SMALL)
+        rate = slope(made.h, remainder, clear) if np.count_nonzero(clear) >= AT_LEAST else None
+        name = f"Taylor remainder {'with the gradient' if order == 2 else 'without it'}"
+        if rate is None:
+            yield Finding(name, float("nan"), RATE, f"too few steps clear of noise to see a rate of {order}")
+        else:
+            yield Finding(name, abs(rate - order), RATE, f"rate {rate:.3g}, expected {order}")
 
 
 def complex_steps(seen: Examination) -> Iterator[Finding]:

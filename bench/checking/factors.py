@@ -8,6 +8,7 @@ No step size enters where R and J take complex numbers; elsewhere one central di
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -137,23 +138,23 @@ def assembly(model: Model, result: Result, p: Array, gradient: Array) -> Iterato
         return
     lam, lin, R_u = np.asarray(result.lam), problem.linearize(u, p), problem.tangent(u, p)
     off = relative(R_u.T @ lam, -lin.J_u)
-    yield Finding("adjoint residual |R_u^T lam + J_u| / |J_u|", off, SOLVED, culprit=_adjoint(R_u, lam, lin.J_u, off))
+    culprit, by_mesh = _adjoint(R_u, lam, lin.J_u, off)
+    yield Finding("adjoint residual |R_u^T lam + J_u| / |J_u|", off, SOLVED, culprit=culprit, by_mesh=by_mesh)
     product = np.asarray(lin.R_p.T @ lam)
     off = relative(gradient, lin.J_p + product)
     culprit, by_mesh = _product(problem, p, gradient, lin, product)
     yield Finding("gradient against J_p + R_p^T lam", off, SOLVED, culprit=culprit, by_mesh=by_mesh)
 
 
-def _adjoint(R_u: object, lam: Array, J_u: Array, off: float) -> str | None:
-    """Which mistake makes lam what it is."""
+def _adjoint(R_u: Any, lam: Array, J_u: Array, off: float) -> tuple[str | None, bool]:
+    """Which mistake makes lam what it is; whether it may be one of the discretization."""
     if off <= SOLVED:
-        return None
-    A: Array = R_u  # type: ignore[assignment]  # anything with @ and .T
-    if relative(A @ lam, -J_u) <= SOLVED:
-        return "the transpose: R_u was solved with where R_u^T should be"
-    if relative(A.T @ lam, J_u) <= SOLVED:
-        return "the sign of lam"
-    return None
+        return None, False
+    if relative(R_u @ lam, -J_u) <= SOLVED:
+        return "the transpose: R_u was solved with where R_u^T should be", False
+    if relative(R_u.T @ lam, J_u) <= SOLVED:
+        return "the sign of lam", False
+    return "the adjoint solve: R_u^T lam = -J_u does not hold", True
 
 
 def _product(
@@ -169,8 +170,8 @@ def _product(
         return "the sign of lam", False
     wrong = np.flatnonzero(np.abs(gradient - right) > SOLVED * size)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = (gradient / right)[wrong]
-        by_scale = ratio / np.exp(-p[wrong])
+        by_scale = (gradient / right / np.exp(-p))[wrong]
+        ratio = ((gradient - lin.J_p) / product)[wrong]
     if _one(by_scale) and abs(float(np.median(by_scale)) - 1.0) <= ALIKE:
         return "the chain rule of p = log(...): dJ/dp was left as dJ/dexp(p)", False
     names = ", ".join(problem.parameters.label(int(i)) for i in wrong[:3])

@@ -15,6 +15,7 @@ from problems.problem import Array
 
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what code of others may raise
 SINGLE = float(np.finfo(np.float32).eps)
+DISTINCT = 5  # values: fewer may fit into float32 by chance, as whole numbers do
 DOUBLE = float(np.finfo(np.float64).eps)
 
 
@@ -52,7 +53,7 @@ class Guarded:
     accidents: list[Accident] = field(default_factory=list)
     mutates: bool = False
     _single: bool = True
-    _seen: int = 0
+    _values: set[float] = field(default_factory=set)
 
     def __call__(self, p: Array) -> float:
         if self.left() < 1:
@@ -70,7 +71,8 @@ class Guarded:
             self._accident(p, f"J = {value}")
             return math.nan
         self._single &= abs(value) < 3e38 and float(np.float32(value)) == value
-        self._seen += value != 0.0
+        if len(self._values) < DISTINCT:
+            self._values.add(value)
         return value
 
     def sharing(self, objective: Callable[[Array], Any]) -> Guarded:
@@ -83,8 +85,8 @@ class Guarded:
 
     @property
     def eps(self) -> float:
-        """The epsilon of its numbers: float32's where every one fits into it."""
-        return SINGLE if self._single and self._seen > 2 else DOUBLE
+        """The epsilon of its numbers: float32's where many different ones all fit into it."""
+        return SINGLE if self._single and len(self._values) == DISTINCT else DOUBLE
 
     def _accident(self, p: Array, what: str) -> None:
         self.accidents.append(Accident(p.copy(), what))

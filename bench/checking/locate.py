@@ -33,6 +33,11 @@ class Worst:
         """given / found."""
         return self.given / self.found if self.found else None
 
+    @property
+    def off(self) -> float:
+        """|given - found| relative to the larger."""
+        return abs(self.given - self.found) / (max(abs(self.given), abs(self.found)) or 1.0)
+
 
 @dataclass(frozen=True)
 class Located:
@@ -78,30 +83,30 @@ class Search:
         return len(members) > 0 and not self.off(members) <= self.allowed
 
     def one(self, members: Array) -> int | None:
-        """A wrong component among members that are wrong together; None where halving loses it in noise."""
+        """A component among members that are wrong together: the left half tells which half; None without calls."""
         while len(members) > 1:
+            if self.J.left() < 2:
+                return None
             left, right = np.array_split(members, 2)
-            if self.J.left() < 4:
-                return None
-            if self.wrong(left):
-                members = left
-            elif self.wrong(right):
-                members = right
-            else:
-                return None
+            members = left if self.wrong(left) else right
         return int(members[0])
 
     def measure(self, i: int) -> Worst | None:
         """The component by differences; None where it agrees after all."""
+        if self.J.left() < 2 * len(AROUND):
+            return None
         (probe,) = components(self.subject, [i])
         s = sweep(self.J, self.J_0, self.subject, self.gradient, probe, self.h * AROUND)
         reading = Reading(s, self.plateau.noise, self.plateau.size, self.plateau.accepted)
         return wrong_component(reading, self.subject) if reading.says == "plateau" else None
 
 
-def locate(search: Search, known: Sequence[Reading]) -> Located:
-    """Find wrong components; `known` are readings of components that were looked at anyway."""
-    worst = [wrong_component(r, search.subject) for r in known if r.says == "plateau"]
+def locate(search: Search | None, known: Sequence[Reading], subject: Subject) -> Located:
+    """Find wrong components; `known` are readings of components that were looked at anyway, to which it is confined
+    where no direction shows that there is anything to search for."""
+    worst = [wrong_component(r, subject) for r in known if r.says == "plateau"]
+    if search is None:
+        return _sorted(worst)
     n_p = len(search.gradient)
     if len(worst) == len(known) >= 3:
         return _sorted(worst, everywhere=True)

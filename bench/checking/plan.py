@@ -51,10 +51,11 @@ class Plan:
         count = round(decades * self.per_decade)
         return np.asarray(self.h_max * 10.0 ** (-np.arange(count, -1, -1) / self.per_decade))
 
-    def near(self, h: float) -> Array:
-        """The steps within LOCAL decades of h."""
+    def near(self, h: float, decades: float = LOCAL) -> Array:
+        """The steps within so many decades of h."""
         steps = self.steps
-        return np.asarray(steps[np.abs(np.log10(steps / h)) <= LOCAL + 1e-9])
+        nearest = steps[np.abs(np.log10(steps / h)).argmin()]
+        return np.asarray(steps[np.abs(np.log10(steps / nearest)) <= decades + 1e-9])
 
 
 LEAST = 20

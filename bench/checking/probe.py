@@ -11,6 +11,8 @@ from bench.checking.guarded import Guarded
 from bench.checking.subject import Subject
 from problems.problem import Array
 
+LIKELY = 1e-6  # where truncation and round-off of central differences balance on a well-scaled problem
+
 
 @dataclass(frozen=True)
 class Probe:
@@ -83,11 +85,13 @@ ARRAYS = ("h", "J_plus", "J_minus", "s_plus", "s_minus")
 
 
 def sweep(J: Guarded, J_0: float, subject: Subject, gradient: Array, probe: Probe, h: Array) -> Sweep:
-    """Evaluate J on both sides for every step, as far as the budget goes; sides out of bounds are left out."""
+    """Evaluate J on both sides for every step, as far as the budget goes, the likeliest steps first; sides out of
+    bounds are left out."""
     J_side, s_side = np.full((2, len(h)), np.nan), np.full((2, len(h)), np.nan)
-    for k, step in enumerate(h):
+    for k in np.argsort(np.abs(np.log10(h / LIKELY)), kind="stable"):
         if J.left() < 2:
             break
+        step = h[k]
         for side, sign in enumerate((1.0, -1.0)):
             q = subject.p + sign * step * probe.v
             change = q - subject.p

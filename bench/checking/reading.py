@@ -125,11 +125,11 @@ class Reading:
 
     @cached_property
     def central(self) -> Curve:
-        return fit(self.sweep.h, self.errors(central=True))
+        return fit(self.sweep.h, self.errors(central=True), self.noise / (self.scale or 1.0) / np.sqrt(2.0))
 
     @cached_property
     def one_sided(self) -> Curve:
-        return fit(self.sweep.h, self.errors(central=False))
+        return fit(self.sweep.h, self.errors(central=False), self.noise / (self.scale or 1.0))
 
 
 def stencil_changes(active_set: Callable[[Array], Hashable], p: Array, v: Array) -> Callable[[float], int]:

@@ -18,10 +18,10 @@ from bench.checking.subject import Subject
 from problems.errors import RoutesError
 from problems.problem import Array
 
-FACTORS = (1e-2, 1e-4, 1e-6)  # of the forward tolerance
-MOVED = 0.1  # of a plateau, which has then not stood still
+FACTORS = (1e-3, 1e-6, 1e-9)  # of the forward tolerance: Newton's steps square it, so a decade may change nothing
 FALLEN = 1.0 / 3.0
-FIELDS = 3  # smooth directions compared between meshes
+FIELDS = 2  # smooth directions compared between meshes
+BESIDE = 0.5  # decades on both sides of the best step, where they are
 WAVES = 0.75  # periods of a smooth direction across the body, at most
 SHRINKS = 0.6  # order in h from which on a plateau is one of the discretization
 
@@ -34,32 +34,27 @@ def fell(before: Reading, after: Reading) -> bool:
 
 
 def tighten(seen: Examination, reading: Reading) -> Iterator[Tightened]:
-    """The line of `reading` once more with a tighter forward solve, tighter still as long as it moves undecided."""
-    assert seen.subject.tighten is not None
-    before = reading
+    """The line of `reading` once more with a tighter forward solve, and a tighter one until what stood there falls."""
     for factor in FACTORS:
         again = _again(seen, reading, factor)
         if again is None:
             return
         yield again
-        if fell(reading, again.reading) or again.reading.says != "plateau":
+        if fell(reading, again.reading):
             return
-        if before.level is not None and abs(again.reading.off - before.off) < MOVED * before.off:
-            return
-        before = again.reading
 
 
 def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | None:
     """None where the tightened subject cannot be had, or its calls are not left."""
     plan, line = seen.plan, reading.sweep.probe
     h = plan.steps if plan.everywhere or reading.level is None else plan.near(reading.level.h)
-    if seen.J.left() < 2 * len(h) + 2:
+    if seen.subject.tighten is None or seen.J.left() < 2 * len(h) + 2:
         return None
     try:
-        subject = seen.subject.tighten(factor) if seen.subject.tighten is not None else None
-        if subject is None:
-            return None
+        subject = seen.subject.tighten(factor)
         other = Examination.of(subject, plan, seen.J.sharing(subject.objective), seen.accepted)
+        if not plan.everywhere:
+            other.readings.append(reading)  # tells the noise of J, which few steps cannot
         tight = other.read(line, h)
     except (Unusable, RoutesError):
         return None
@@ -74,9 +69,13 @@ def _relative(value: float, scale: float) -> float:
 
 
 def refine(seen: Examination, other: Subject, h: float) -> Refined | None:
-    """Plateaus along smooth fields of the parameters on both meshes, with steps about h; None where the two cannot be
-    compared."""
-    steps = seen.plan.near(h)
+    """Plateaus along smooth fields of the parameters on both meshes, with steps about h.
+
+    None where the two cannot be compared, or the budget does not suffice.
+    """
+    steps = seen.plan.near(h, BESIDE)
+    if seen.J.left() < 4 * (FIELDS * len(steps) + 1):
+        return None
     before = _plateau(seen.subject, seen.plan, seen.J, steps)
     after = _plateau(other, seen.plan, seen.J, steps)
     if before is None or after is None:

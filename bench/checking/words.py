@@ -15,6 +15,7 @@ from bench.checking.reading import Reading
 from bench.checking.result import Check, Verdict
 
 SHOWN = 3  # accidents and components named in a sentence
+NEXT_TO_ONE = 0.01
 TIGHTEN = "offer tighten(factor), which returns the same thing with its solver tightened"
 
 
@@ -31,10 +32,10 @@ def on_agreement(check: Check, noisy: Sequence[Reading]) -> Check:
     line = check.deciding
     assert line is not None
     says = (
-        f"differences agree with the gradient to {line.known_to:.1e} along {_lines(check)};"
+        f"differences agree with the gradient to {max(line.off, line.known_to):.1e} along {_lines(check)};"
         f" best step {_best(line)}, floor {_floor(line)}"
     )
-    unsound = [f.name for f in check.findings if f.sound is False]
+    unsound = [f.name for f in check.findings if f.sound is False and not f.name.startswith("Taylor")]
     if noisy:
         names = ", ".join(r.sweep.probe.name for r in noisy[:SHOWN])
         says += f"; too small for the noise of J to tell: {names}"
@@ -101,7 +102,7 @@ def on_plateau(check: Check, verdict: Verdict) -> Check:
         says += "; so small a plateau may be a loosely solved J as well as a small wrong term"
         return replace(check, verdict=verdict, says=says, todo=TIGHTEN, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
-    if not check.tightened:
+    if not check.tightened and not (located is not None and located.others_right):
         todo += f"; to rule out the solver, {TIGHTEN}"
     return replace(check, verdict=verdict, says=says, todo=todo, culprit=culprit)
 
@@ -115,10 +116,10 @@ def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
         said.append(f"J is not deterministic: {len(seen.repeated)} calls at p scatter by {np.std(seen.repeated):.1e}")
     if J.eps > np.finfo(np.float64).eps:
         said.append(f"J has the precision of float32: its noise is at least {J.eps * abs(seen.J_0):.1e}")
-    if not any(r.sweep.two_sided for r in check.readings):
-        said.append("p lies on its bounds: differences are one-sided")
-    elif any(not np.isfinite(r.sweep.J_minus).any() or not np.isfinite(r.sweep.J_plus).any() for r in check.readings):
-        said.append("some components lie on their bounds: one-sided differences there")
+    bound = np.flatnonzero((seen.subject.p <= seen.subject.lower) | (seen.subject.p >= seen.subject.upper))
+    if bound.size:
+        names = ", ".join(seen.subject.label(int(i)) for i in bound[:SHOWN])
+        said.append(f"on their bounds, differenced to one side: {names}" + (" ..." if bound.size > SHOWN else ""))
     if J.accidents:
         said.append(_accidents(J.accidents, seen))
     scaled = [r.sweep.probe.name for r in check.readings if r.sweep.probe.index is not None and not r.own_scale]
@@ -185,24 +186,30 @@ def _components(located: Located, n_p: int) -> str:
     w = located.worst[0]
     named = ", ".join(x.name for x in located.worst[:SHOWN])
     if located.everywhere and located.factor is not None:
-        return f"all components looked at ({named}) are off by the factor {located.factor:.3g}"
+        return f"all components looked at ({named}) are off by {_factor(located.factor)}"
     if located.everywhere:
         return f"many components are wrong, {named} among them: {_pair(w)}"
-    rest = f", the other {n_p - len(located.worst)} are right" if located.others_right else ""
+    others = n_p - len(located.worst)
+    rest = f", the other {others} are right" if located.others_right and others else ""
     return f"{named}: {_pair(w)}{rest}"
 
 
 def _pair(w: Worst) -> str:
-    factor = "" if w.factor is None else f", a factor of {w.factor:.3g}"
+    factor = "" if w.factor is None else f", {_factor(w.factor)}"
     return f"the gradient says {w.given:.6g} where differences say {w.found:.6g}{factor}"
+
+
+def _factor(factor: float) -> str:
+    """A factor next to 1 is told by its distance."""
+    return f"the factor {factor:.3g}" if abs(factor - 1.0) >= NEXT_TO_ONE else f"{abs(factor - 1.0):.1e} of it"
 
 
 def _component_culprit(located: Located) -> str:
     w = located.worst[0]
     if located.everywhere and located.factor is not None:
-        return f"the whole gradient, off by the factor {located.factor:.3g}"
+        return f"the whole gradient, off by {_factor(located.factor)}"
     if located.everywhere:
         return "many components"
-    factor = "" if w.factor is None else f", off by the factor {w.factor:.3g}"
+    factor = "" if w.factor is None else f", off by {_factor(w.factor)}"
     more = f" and {len(located.worst) - 1} more" if len(located.worst) > 1 else ""
     return f"component {w.name}{factor}{more}"

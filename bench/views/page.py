@@ -58,8 +58,9 @@ def page(check: Check) -> str:
     body += [f"<p class='note'>{escape(remark)}</p>" for remark in check.remarks]
     body.append(f"<p class='note'>{check.calls} objective calls, {check.gradients} gradient</p>")
     title = escape(f"{check.name}: {check.verdict}")
-    head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{title}</title>"
-    return f"<!doctype html>\n<html lang='en'><head>{head}<style>{STYLE}</style></head>\n<body>{''.join(body)}</body></html>\n"
+    meta = "<meta charset='utf-8'><meta name='viewport' content='width=device-width'>"
+    head = f"<head>{meta}<title>{title}</title><style>{STYLE}</style></head>"
+    return f"<!doctype html>\n<html lang='en'>{head}\n<body>{''.join(body)}</body></html>\n"
 
 
 def _drawn(check: Check) -> list[Reading]:

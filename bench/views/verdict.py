@@ -23,6 +23,7 @@ STYLES = {
     "inconsistent-discretization": "bold red",
 }
 INCONCLUSIVE = "bold yellow"
+WIDEST = 100  # columns of a plot
 MARKS = {True: "ok", False: "NO", None: "?"}
 
 
@@ -38,7 +39,7 @@ def show_check(out: Console, check: Check, curves: bool = True) -> None:
         show(out, lines(check))
     if curves and check.deciding is not None:
         out.print()
-        out.print(curve(check, check.deciding, out.width))
+        out.print(curve(check, check.deciding, min(out.width, WIDEST)))
     if check.findings:
         out.print()
         show(out, evidence(check.findings))
