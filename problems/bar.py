@@ -118,11 +118,14 @@ class Bar(Problem):
         return tuple(notes)
 
     def _tip_load(self, C: Any) -> tuple[Any, Any]:
-        """F - q that a bar of compliance C [m/N] carries behind its stop, and its derivative by C."""
+        """T = F - q, what a bar of compliance C [m/N] carries in equilibrium with its stop, and dT/dC."""
         if self.stop is None:
             return F, 0.0
-        q, kappa = self.stop.in_series(F * C - self.stop.gap, C)
-        return F - q, -kappa * (F - q)
+        g_0, gap = F * C - self.stop.gap, self.stop.gap
+        g, kappa = self.stop.in_series(g_0, C)
+        q = (g_0 - g) / C
+        T = F - q if 2.0 * q < F else (g + gap) / C  # u_N / C: where the stop carries nearly all, F - q cancels
+        return T, -kappa * T
 
     def modulus(self, p: Any, xp: Any = np) -> Any:
         """E(p), (N,) [Pa]."""
@@ -200,7 +203,7 @@ class Bar(Problem):
     def reference(self, p: Array) -> Reference:
         """Closed form: u_k = T S_k with the compliances s_e = L_e / (A E_e), their sums S_k = sum_{e <= k} s_e, and the
 
-        tip load T = F - q(C), C = S_N, in equilibrium with the stop: dT/dC = T'. Hence
+        tip load T(C), C = S_N, in equilibrium with the stop; T' = dT/dC. Hence
 
         dJ/dE_e = - s_e / E_e (T sum_{sensors k >= e} r_k + T' sum_{sensors k} r_k S_k) + alpha dPhi/dE_e,  r = u - d
 

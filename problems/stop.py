@@ -127,16 +127,16 @@ class Compliant:
         return self.law.branch(u[-1] - self.gap)
 
     def in_series(self, g_0: Any, C: Any) -> tuple[Any, Any]:
-        """q and kappa = k / (1 + k C) of a bar of compliance C [m/N] that would reach g_0 if nothing stopped it.
+        """g and kappa = k / (1 + k C) of a bar of compliance C [m/N] that would reach g_0 if nothing stopped it.
 
-        g = g_0 - C q, hence dq/dC = kappa (F - q) under the load F. By Newton's method from g_0, from where g falls to
-        the solution, q being convex; exact for the penalty.
+        g + C q(g) = g_0, hence dq/dC = kappa (F - q) under the load F. By Newton's method from g_0, where it
+        falls to the solution, q being convex; exact for the penalty.
         """
         g, g_next = np.inf, g_0
         while g_next < g:
             g, k = g_next, self.law.stiffness(g_next)
             g_next = (g_0 + C * (k * g - self.law.force(g))) / (1.0 + C * k)
-        return (g_0 - g) / C, k / (1.0 + C * k)
+        return g, k / (1.0 + C * k)
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ class Rigid:
 
     def in_series(self, g_0: Any, C: Any) -> tuple[Any, Any]:
         """The limit of Compliant's as k grows beyond bounds."""
-        return (g_0 / C, 1.0 / C) if g_0 > 0.0 else (0.0 * C, 0.0 * C)
+        return (0.0 * C, 1.0 / C) if g_0 > 0.0 else (g_0, 0.0 * C)
 
 
 Stop = Compliant | Rigid

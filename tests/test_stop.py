@@ -192,6 +192,16 @@ def test_a_stiff_bar_is_not_solved_on_the_wrong_set() -> None:
 
 
 @by_stop
+@pytest.mark.parametrize("E", [1e-9, 1e9])
+def test_the_closed_form_holds_where_the_stop_carries_nearly_all_or_nothing(stop: str, E: float) -> None:
+    """F - q is 1e-9 F where the bar is soft; the closed form takes it from u_N instead."""
+    bar = Bar(stop=stop, parametrization="raw")
+    p = E * np.random.default_rng(0).uniform(0.8, 1.2, 8)
+    result, _, _ = differentiate(adjoint, bar, p)
+    assert error(result.gradient, bar.reference(p))[0] < 1e-12
+
+
+@by_stop
 def test_synthetic_data_are_read_from_the_bar_with_its_stop(stop: str) -> None:
     bar = Bar(n=40, sensors=40, stop=stop, gap=0.7)
     assert Model(bar).value(bar.truth()) < 1e-28
