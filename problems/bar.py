@@ -1,20 +1,24 @@
 """The bar: N two-node elements in a row, fixed at x = 0, pulled at x = L, one modulus each.
 
 K(E) u = f,    k_e = E_e A / L_e [[1, -1], [-1, 1]],    f = F at node N,    K = B^T diag(E A / L_e) B
+
+Beyond the tip there may be a stop (problems/stop.py): its force makes the problem nonlinear, and not smooth.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.chain import Chain, ElementForces, cumulative_sum, difference, divergence
+from problems.chain import Bordered, Chain, ElementForces, cumulative_sum, difference, divergence
 from problems.errors import InputError
 from problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Reference, Traced
 from problems.regularization import tikhonov, tikhonov_gradient
 from problems.sensors import Nodes, Sensors, measured, parse_nodes
+from problems.stop import GAP, K_C, WIDTH, StopName, stop_of
 
 L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
 THETA_MAX = 170.0  # E = exp(theta) < 1e74: the squares and cubes of E in J and dJ/dE stay in float64's range
@@ -34,7 +38,9 @@ class Bar(Problem):
     """A bar whose moduli are sought from displacements: the smallest problem with a blind spot.
 
     State u (N,) [m], displacement of nodes 1..N; parameters theta = log E or E itself (N,), E in Pa.
-    Elements behind the last sensor carry load but move no sensor: their data gradient is exactly 0.
+    Elements behind the last sensor carry load but move no sensor: their data gradient is exactly 0, unless the tip
+    touches a stop, whose force they share in. With stop=multiplier the state ends with that force [N]. Synthetic data
+    are read from the bar with its stop.
     Strains are differences of displacements, so with sensors far from the clamp gradients are good to eps N, not eps:
     4e-11 at N = 10^6 with a sensor at every node, 1e-16 with five next to the clamp.
     """
@@ -42,7 +48,6 @@ class Bar(Problem):
     name = "bar"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     linear = True
-    structure = "spd"
 
     def __init__(
         self,
@@ -54,6 +59,10 @@ class Bar(Problem):
         noise: Annotated[float, "standard deviation added to synthetic data [m]"] = 0.0,
         seed: Annotated[int, "of that noise"] = 0,
         alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
+        stop: Annotated[StopName, "beyond the tip; multiplier: rigid, the others yield by k_c"] = "none",
+        gap: Annotated[float, "that the tip may move before it meets the stop [m]"] = GAP,
+        k_c: Annotated[float, "stiffness of a stop that yields [N/m]"] = K_C,
+        width: Annotated[float, "over which softplus and quadratic round the kink of the penalty [m]"] = WIDTH,
     ) -> None:
         if not 1 <= n <= N_MAX:
             raise InputError(f"bar: n={n} elements - choose n >= 1 and <= {N_MAX}")
@@ -65,7 +74,11 @@ class Bar(Problem):
             raise InputError(f"bar: seed={seed} - choose seed >= 0")
         if data is not None and noise > 0:
             raise InputError("bar: noise= is added to synthetic data only - drop it or drop data=")
-        self.n_state = n
+        self.stop = stop_of(stop, gap, k_c, width, "bar")
+        self.n, self.n_state, self.structure = n, n, "spd"
+        if self.stop is not None:
+            self.n_state, self.structure = n + self.stop.multipliers, self.stop.structure
+            self.linear, self.line_search = False, False  # q is convex: full steps converge, from one side
         self.log = parametrization == "log"
         self.alpha = alpha
         self.L_e = L / n
@@ -77,7 +90,8 @@ class Bar(Problem):
             self.sensors = measured(data, n, sensors, "bar")
         else:
             nodes = parse_nodes(min(5, n) if sensors is None else sensors, n, "bar")
-            d = cumulative_sum(F * self.L_e / (A * true_modulus(self.x)))[nodes - 1]
+            S = cumulative_sum(self.L_e / (A * true_modulus(self.x)))
+            d = (self._tip_load(S[-1])[0] * S)[nodes - 1]
             self.sensors = Sensors(nodes, d + noise * np.random.default_rng(seed).standard_normal(len(nodes)))
         self.parameters = Parameters(
             start=np.zeros(n) if self.log else np.ones(n),
@@ -92,10 +106,26 @@ class Bar(Problem):
         self.notes = self._notes()
 
     def _notes(self) -> tuple[str, ...]:
-        n_blind = self.n_state - self.last_sensor
-        if n_blind == self.n_state:
-            return ("no sensors: J has no data term, its data gradient is exactly 0",)
-        return (f"{n_blind} of {self.n_state} elements lie behind the last sensor: blind",) if n_blind else ()
+        n_blind, stop = self.n - self.last_sensor, self.stop
+        blind = "blind" if stop is None else "blind unless the tip touches the stop"
+        if stop is not None and not stop.fades:
+            blind = "seen through the force of the stop alone, which is never quite 0"
+        notes = [f"{n_blind} of {self.n} elements lie behind the last sensor: {blind}"] if n_blind else []
+        if n_blind == self.n:
+            notes = ["no sensors: J has no data term, its data gradient is exactly 0"]
+        if stop is not None and stop.gap < 0:
+            notes += [f"gap={stop.gap:g} < 0: the stop presses on the tip of the unloaded bar"]
+        return tuple(notes)
+
+    def _tip_load(self, C: Any) -> tuple[Any, Any]:
+        """T = F - q, what a bar of compliance C [m/N] carries in equilibrium with its stop, and dT/dC."""
+        if self.stop is None:
+            return F, 0.0
+        g_0, gap = F * C - self.stop.gap, self.stop.gap
+        g, kappa = self.stop.in_series(g_0, C)
+        q = (g_0 - g) / C
+        T = F - q if 2.0 * q < F else (g + gap) / C  # u_N / C: where the stop carries nearly all, F - q cancels
+        return T, -kappa * T
 
     def modulus(self, p: Any, xp: Any = np) -> Any:
         """E(p), (N,) [Pa]."""
@@ -109,11 +139,17 @@ class Bar(Problem):
         return self.modulus(p, xp) * (A / self.L_e)
 
     def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
-        """R = B^T D B u - f, (N,) [N]."""
-        return divergence(self.stiffness(p, xp) * difference(u, xp), xp) - xp.asarray(self.f)
+        """R = B^T D B u - f, (N,) [N], and what the stop adds to it."""
+        R = divergence(self.stiffness(p, xp) * difference(u[: self.n], xp), xp) - xp.asarray(self.f)
+        return R if self.stop is None else self.stop.balance(R, u, xp)
 
-    def tangent(self, u: Array, p: Array) -> Chain:
-        return Chain(self.stiffness(p))
+    def tangent(self, u: Array, p: Array) -> Chain | Bordered:
+        D = self.stiffness(p)
+        return Chain(D) if self.stop is None else self.stop.tangent(D, u)
+
+    def active_set(self, u: Array, p: Array) -> str | None:
+        """Open or closed, where the force of the stop has a kink."""
+        return None if self.stop is None else self.stop.active_set(u)
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 |S u - d|^2 + alpha Phi [m^2]."""
@@ -127,14 +163,28 @@ class Bar(Problem):
         if self.alpha:
             dPhi = tikhonov_gradient(self.log_modulus(p))
             J_p = self.alpha * (dPhi if self.log else dPhi / p)
-        return Linearization(ElementForces(dD_dp * difference(u)), self.sensors.misfit_gradient(u), J_p)
+        R_p = ElementForces(dD_dp * difference(u[: self.n]), zero_rows=self.n_state - self.n)
+        return Linearization(R_p, self.sensors.misfit_gradient(u), J_p)
+
+    def integral(self, u: Array, p: Array) -> tuple[float, Array] | None:
+        """1/(2 h) of the integral of the squared misfit between the first and the last sensor, and alpha Phi.
+
+        The misfit is linear between neighbouring sensors, h their mean distance: J is a quadrature of it.
+        """
+        integral = self.sensors.integral(u)
+        if integral is None:
+            return None
+        value, by_u = integral
+        return float(value + self.alpha * tikhonov(np, self.log_modulus(p))), by_u
 
     def traced(self) -> Traced:
         from problems.jax64 import jnp
 
-        return Traced(
-            residual=lambda u, p: self.residual(u, p, jnp),
-            objective=lambda u, p: self.objective(u, p, jnp),
+        physics = Traced(lambda u, p: self.residual(u, p, jnp), lambda u, p: self.objective(u, p, jnp))
+        if not self.linear:
+            return physics
+        return replace(
+            physics,
             diagonal=lambda p: self._diagonal(self.stiffness(p, jnp), jnp),
             spectral_bound=lambda p: self._spectral_bound(self.stiffness(p, jnp), jnp),
         )
@@ -151,25 +201,28 @@ class Bar(Problem):
         return largest * xp.sum((rows / largest) ** q) ** (1.0 / q)
 
     def reference(self, p: Array) -> Reference:
-        """Closed form: u_k = sum_{e <= k} c_e with the compliances c_e = F L_e / (A E_e), so
+        """Closed form: u_k = T S_k with the compliances s_e = L_e / (A E_e), their sums S_k = sum_{e <= k} s_e, and the
 
-        dJ/dE_e = - c_e / E_e sum_{sensors k >= e} (u_k - d_k) + alpha dPhi/dE_e
+        tip load T(C), C = S_N, in equilibrium with the stop; T' = dT/dC. Hence
+
+        dJ/dE_e = - s_e / E_e (T sum_{sensors k >= e} r_k + T' sum_{sensors k} r_k S_k) + alpha dPhi/dE_e,  r = u - d
 
         Summed in extended precision where the platform has one (x86), so that it is better than what it judges.
         """
         E = self.modulus(p.astype(np.longdouble))
-        c = F * np.longdouble(self.L_e) / (A * E)
-        u = np.cumsum(c)
+        s = np.longdouble(self.L_e) / (A * E)
+        S = np.cumsum(s)
+        T, dT_dC = self._tip_load(S[-1])
         at, d = self.sensors.nodes - 1, self.sensors.d
-        r, size = np.zeros((2, self.n_state), np.longdouble)
-        r[at], size[at] = u[at] - d, u[at] + abs(d)
+        r, size = np.zeros((2, self.n), np.longdouble)
+        r[at], size[at] = T * S[at] - d, abs(T * S[at]) + abs(d)
         seen_r, seen_size = np.cumsum(r[::-1])[::-1], np.cumsum(size[::-1])[::-1]
         theta = np.log(E)
         jumps = np.diff(theta)
         dPhi = np.concatenate([[0.0], jumps]) - np.concatenate([jumps, [0.0]])
-        dJ_dtheta = -c * seen_r + self.alpha * dPhi
+        dJ_dtheta = -s * (T * seen_r + dT_dC * (r @ S)) + self.alpha * dPhi
         chain_rule = 1.0 if self.log else 1.0 / E
-        terms = (c * seen_size + self.alpha * abs(dPhi)) * chain_rule
+        terms = (s * (abs(T) * seen_size + abs(dT_dC) * (size @ S)) + self.alpha * abs(dPhi)) * chain_rule
         return Reference("closed form", np.asarray(dJ_dtheta * chain_rule, float), float(np.sqrt(np.sum(terms**2))))
 
     def truth(self) -> Array | None:
@@ -179,16 +232,21 @@ class Bar(Problem):
         return np.log(E) if self.log else E
 
     def condition(self, p: Array) -> float:
-        """That of equal springs (eigenvalues 4 k sin^2((2 j - 1) pi / (4 N + 2))), times the contrast of the moduli."""
+        """That of equal springs (eigenvalues 4 k sin^2((2 j - 1) pi / (4 N + 2))), times the contrast of the moduli.
+
+        A stop adds one eigenvalue, hence one iteration.
+        """
         D = self.stiffness(p)
-        return float(D.max() / D.min()) / math.sin(math.pi / (4 * self.n_state + 2)) ** 2
+        return float(D.max() / D.min()) / math.sin(math.pi / (4 * self.n + 2)) ** 2
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         """Forward strain and, for the adjoint, adjoint strain: dJ/dE_e = A L_e eps_e[u] eps_e[lam] (data term)."""
-        eps = difference(u) / self.L_e
+        eps = difference(u[: self.n]) / self.L_e
         columns = {"x": self.x, "E": self.modulus(p), "eps[u]": eps}
         if lam is not None:
-            eps_lam = difference(lam) / self.L_e
+            eps_lam = difference(lam[: self.n]) / self.L_e
             columns |= {"eps[lam]": eps_lam, "A L_e eps eps": A * self.L_e * eps * eps_lam}
         mark = "blind, alpha Phi only" if self.alpha else "blind"
-        return ParameterView(columns, np.arange(self.n_state) >= self.last_sensor, mark)
+        behind = np.arange(self.n) >= self.last_sensor
+        touched = self.stop is not None and self.stop.touched(u)
+        return ParameterView(columns, behind & (not touched), mark)

@@ -12,7 +12,7 @@ import numpy as np
 
 from problems import bodies, probes, unknowns
 from problems.elements import ElementName
-from problems.errors import InputError
+from problems.errors import InputError, check_applies
 from problems.mechanics import Load, Mechanics
 from problems.problem import Array, Fields, Linearization, Offers, Operator, ParameterView, Problem, Traced
 from problems.supports import Supports, check_clamp
@@ -70,7 +70,8 @@ class Block(Problem):
         seed: Annotated[int, "of noise and markers"] = 0,
     ) -> None:
         _check_counts(n=n, nx=nx, ny=ny, nz=nz, layers=layers, cases=cases, markers=markers, seed=seed)
-        _check_applies(
+        check_applies(
+            "block",
             ("mesh", mesh is not None, False, {"n": n != 4, "nx": nx, "ny": ny, "nz": nz, "size": size != "1"}),
             ("mesh", mesh is not None, False, {"element": element != "hex8"}),
             ("markers", markers > 0, True, {"face": face != "right", "components": components != "all"}),
@@ -253,15 +254,6 @@ def _check_counts(**counts: int | None) -> None:
             raise InputError(f"block: {name}={count} - choose {name} >= {least.get(name, 1)}")
     if (counts["cases"] or 0) > len(DIRECTIONS):
         raise InputError(f"block: cases={counts['cases']} - there are 1 to {len(DIRECTIONS)}: along z, x, y")
-
-
-def _check_applies(*rules: tuple[str, bool, bool, dict[str, Any]]) -> None:
-    """Options that would be ignored: (condition, whether it holds, whether the options need it, whether given)."""
-    for condition, holds, needed, options in rules:
-        given = [name for name, value in options.items() if value]
-        if given and holds != needed:
-            verb = "needs" if needed else "does not go with"
-            raise InputError(f"block: {given[0]} {verb} {condition} - leave {given[0]} out or change {condition}")
 
 
 def _check_numbers(nu: float, traction: float, displacement: float, noise: float, data: str | None) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class RoutesError(Exception):
     """Base of every error this project raises on purpose; its text is one line for the user."""
@@ -36,3 +38,12 @@ class NotConverged(RoutesError):
     def __init__(self, message: str, history: tuple[float, ...]) -> None:
         super().__init__(message)
         self.history = history
+
+
+def check_applies(who: str, *rules: tuple[str, bool, bool, dict[str, Any]]) -> None:
+    """Options that would be ignored: (condition, whether it holds, whether the options need it, whether given)."""
+    for condition, holds, needed, options in rules:
+        given = [name for name, value in options.items() if value]
+        if given and holds != needed:
+            verb, change = "needs" if needed else "does not go with", condition.partition("=")[0]
+            raise InputError(f"{who}: {given[0]} {verb} {condition} - leave {given[0]} out or change {change}")

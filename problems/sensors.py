@@ -34,6 +34,23 @@ class Sensors:
         J_u[self.nodes - 1] = u[self.nodes - 1] - self.d
         return J_u
 
+    def integral(self, u: Array) -> tuple[float, Array] | None:
+        """1/2 of the integral of (u - d)^2 along the line of nodes, over the mean distance of sensors; and by u (n_u,).
+
+        u - d is linear between neighbouring sensors: h (r_i^2 + r_i r_j + r_j^2) / 3 each. None for less than two.
+        """
+        if len(self.nodes) < 2:
+            return None
+        order = np.argsort(self.nodes)
+        at = self.nodes[order] - 1
+        r = u[at] - self.d[order]
+        h = np.diff(at) * (len(at) - 1) / (at[-1] - at[0])  # 1 where the distances are equal
+        left, right = r[:-1], r[1:]
+        by_u = np.zeros_like(u)
+        by_u[at[:-1]] += h * (2.0 * left + right) / 6.0
+        by_u[at[1:]] += h * (left + 2.0 * right) / 6.0
+        return float((h * (left**2 + left * right + right**2)).sum() / 6.0), by_u
+
 
 def parse_nodes(nodes: Nodes, n: int, who: str) -> Array:
     """Node numbers (m,) out of 1..n.

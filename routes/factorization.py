@@ -10,10 +10,11 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from problems.chain import Chain, cumulative_sum
+from problems.chain import Bordered, Chain
 from problems.errors import InputError, SingularMatrix
 from problems.problem import Array
 from problems.sparse import BlockDiagonal, GeneralSparse, SymmetricSparse
+from routes.chain_factorization import BorderedFactorization, ChainFactorization
 from routes.pardiso import (
     COMPLEX_GENERAL,
     COMPLEX_SYMMETRIC,
@@ -62,10 +63,12 @@ class Factorizer:
         self._idle: weakref.WeakKeyDictionary[Any, Idle] = weakref.WeakKeyDictionary()
 
     def __call__(self, A: Any, who: str) -> Factorization:
-        """Factorize A: a Chain, a SymmetricSparse or GeneralSparse, BlockDiagonal of such, a dense array or a SciPy
-        sparse matrix. Raises SingularMatrix, and InputError for what cg-amg cannot solve."""
+        """Factorize A: a Chain, Bordered or not, a SymmetricSparse or GeneralSparse, BlockDiagonal of such, a dense
+        array or a SciPy sparse matrix. Raises SingularMatrix, and InputError for what cg-amg cannot solve."""
         if isinstance(A, Chain):
             return ChainFactorization(A, who)
+        if isinstance(A, Bordered):
+            return BorderedFactorization(A, who)
         if isinstance(A, np.ndarray):
             return DenseFactorization(A, who)
         if isinstance(A, BlockDiagonal):
@@ -94,26 +97,6 @@ class Factorizer:
             return PardisoFactorization(A, who, POSITIVE_DEFINITE, idle)
         except SingularMatrix:  # not positive definite: a buckled state, say
             return PardisoFactorization(A, who, SYMMETRIC, idle)
-
-
-class ChainFactorization:
-    """K = B^T D B is its own factorization: K^{-1} b = B^{-1} D^{-1} B^{-T} b, two cumulative sums."""
-
-    name = "cumulative sums"
-
-    def __init__(self, K: Chain, who: str) -> None:
-        bad = np.flatnonzero(~(K.D.real > 0))
-        if bad.size:
-            e = int(bad[0])
-            raise SingularMatrix(f"{who}: stiffness {K.D[e]:g} of element {e + 1} is not positive - check its modulus")
-        self.D = K.D
-        self.norm, self.nbytes = K.norm, K.D.nbytes
-
-    def solve(self, b: Array) -> Array:
-        forces = cumulative_sum(b[::-1])[::-1]  # B^{-T} b: what hangs behind each element
-        return cumulative_sum(forces / self.D)
-
-    solve_transposed = solve
 
 
 class DenseFactorization:

@@ -113,7 +113,8 @@ class Model:
     @property
     def inexact(self) -> bool:
         """Whether real states are solved for by inexact steps."""
-        return self.solver.newton == "inexact" and not self.problem.linear
+        problem = self.problem
+        return self.solver.newton == "inexact" and not problem.linear and problem.line_search
 
     def _direction(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> Direction:
         problem = self.problem
@@ -146,7 +147,14 @@ class Model:
         polish: int = 0,
     ) -> tuple[Array, tuple[float, ...], float]:
         """Newton's method on R + unloading, from u."""
-        step = Step(self.problem.offset, lambda u: self.residual(u, p) + unloading, direction)
+        problem = self.problem
+        step = Step(
+            problem.offset,
+            lambda u: self.residual(u, p) + unloading,
+            direction,
+            problem.line_search,
+            lambda u: problem.active_set(u, p),
+        )
         return newton(step, u, self.solver, self._who, scale, polish)
 
     def relative_residual(self, u: Array, p: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,6 +19,7 @@ STEP_LENGTHS = tuple(0.5**i for i in range(9))
 DESCENT = 1e-4  # of |R|, times the step length, for a step to be taken
 ROUNDING = 16.0 * np.finfo(np.float64).eps  # |R| <= ROUNDING |R_u| (|u| + |X|): no iteration can do better
 
+LAST = 8  # iterates that a report shows
 
 Newton = Literal["full", "inexact"]
 
@@ -29,7 +30,8 @@ class Solver:
 
     linear_solver  of sparse systems: pardiso, superlu, cg-amg, or the best direct one that is installed
     newton         full: R_u is factorized at every step; inexact: once, and again where that pays. A linear problem
-                   takes one full step, complex p full ones: the imaginary part is not watched
+                   takes one full step, complex p full ones: the imaginary part is not watched; and so do problems
+                   without line search: that full steps converge is known of exact ones
     """
 
     rtol: float = 1e-12
@@ -65,11 +67,13 @@ class State:
 
 @dataclass(frozen=True)
 class Step:
-    """What Newton's method needs, bound to one p; offset is what |u| is added to before it is rounded."""
+    """What Newton's method needs of a problem, bound to one p."""
 
     offset: float
     residual: Callable[[Array], Array]
     direction: Direction
+    line_search: bool
+    active_set: Callable[[Array], Hashable | None]
 
 
 def newton(
@@ -85,27 +89,32 @@ def newton(
     The step length a is halved until |R| falls; an inverted element or an overflow gives no finite |R| and is
     stepped back from in the same way, once the direction is as exact as it can be. At least one step is taken, so that
     a warm start is never returned untouched and the factors are those of the neighbourhood; after convergence,
-    `polish` more. Returns u, the history of |R|_inf and the scale. Raises NotConverged with the history.
+    `polish` more. Without line search a is 1 and |R| may rise. Where R is smooth in pieces, a small |R| counts only on
+    the piece that the step was made for, as |R_u| of a stiff penalty makes everything rounding; or where |R| was small
+    before, too, as at a kink. Returns u, the history of |R|_inf and the scale. Raises NotConverged with the history.
     """
     R = step.residual(u)
-    history = [norm(R)]
+    history, sets = [norm(R)], [step.active_set(u)]
     scale = history[0] if scale is None else scale
     goal = solver.rtol * scale
     while len(history) <= solver.max_steps and math.isfinite(history[-1]):
         du, norm_of_R_u = step.direction(u, R, scale, goal)
-        for a in STEP_LENGTHS:
+        for a in STEP_LENGTHS if step.line_search else (1.0,):
             u_next = u - a * du
-            R_next = step.residual(u_next)
+            R_next, set_next = step.residual(u_next), step.active_set(u_next)
             rounding = ROUNDING * norm_of_R_u * (norm(u_next) + step.offset)
-            small = norm(R_next) <= max(solver.rtol * scale, rounding)
-            if small or norm(R_next) <= (1.0 - DESCENT * a) * history[-1]:
+            small = norm(R_next) <= max(solver.rtol * scale, rounding) and set_next == sets[-1]
+            small |= max(norm(R_next), history[-1]) <= solver.rtol * scale
+            lower = norm(R_next) <= (1.0 - DESCENT * a) * history[-1]
+            if small or lower or (not step.line_search and math.isfinite(norm(R_next))):
                 break
         else:
             if step.direction.renew():
                 continue
-            raise NotConverged(_report(who, history, "no step along Newton's direction lowers |R|"), tuple(history))
+            raise _failure(who, history, sets, "no step along Newton's direction lowers |R|")
         u, R = u_next, R_next
         history.append(norm(R))
+        sets.append(set_next)
         if small:
             if polish == 0:
                 return u, tuple(history), scale
@@ -114,14 +123,14 @@ def newton(
         raise NotConverged(
             f"{who}: R is not finite where the solve starts - lower the load or choose another p", tuple(history)
         )
-    raise NotConverged(
-        _report(who, history, f"wanted {solver.rtol * scale:.3g}, max-steps={solver.max_steps}"), tuple(history)
-    )
+    raise _failure(who, history, sets, f"wanted {solver.rtol * scale:.3g}, max-steps={solver.max_steps}")
 
 
-def _report(who: str, history: list[float], why: str) -> str:
-    last = " ".join(f"{r:.2g}" for r in history[-8:])
-    return f"{who}: not converged in {len(history) - 1} steps: {why}; |R| = {last} - lower the load or start nearer"
+def _failure(who: str, history: list[float], sets: list[Hashable | None], why: str) -> NotConverged:
+    last = " ".join(f"{r:.2g}" for r in history[-LAST:])
+    report = f"not converged in {len(history) - 1} steps: {why}; |R| = {last} - lower the load or start nearer"
+    visited = "" if sets[-1] is None else f"; active sets: {' '.join(str(one) for one in sets[-LAST:])}"
+    return NotConverged(f"{who}: {report}{visited}", tuple(history))
 
 
 def norm(v: Array) -> float:

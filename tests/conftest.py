@@ -57,6 +57,14 @@ BARS = {
     "bar[raw,alpha]": {"parametrization": "raw", "alpha": 0.3},
     "bar[sensors]": {"n": 12, "sensors": [2, 3, 7]},
     "bar[noise]": {"n": 21, "sensors": 21, "noise": 0.01, "seed": 4},
+    # at `somewhere` 0.1 to 0.3 m away from a kink; the rounded ones in the middle of their curves, wide enough to see
+    "bar[penalty]": {"n": 3, "sensors": 2, "stop": "penalty", "alpha": 0.1},
+    "bar[penalty,open]": {"n": 3, "sensors": 2, "stop": "penalty", "gap": 1.5, "parametrization": "raw"},
+    "bar[softplus]": {"n": 3, "sensors": 2, "stop": "softplus", "width": 0.1},
+    "bar[quadratic]": {"n": 3, "sensors": 2, "stop": "quadratic", "width": 0.2, "k_c": 3.0},
+    "bar[multiplier]": {"n": 3, "sensors": 2, "stop": "multiplier", "parametrization": "raw", "alpha": 0.1},
+    "bar[multiplier,open]": {"n": 3, "sensors": 2, "stop": "multiplier", "gap": 1.5},
+    "bar[multiplier,tip]": {"n": 4, "sensors": 4, "stop": "multiplier", "gap": -0.2},
 }
 ADVECTIONS = {
     "advection": {"n": 4},
