@@ -20,6 +20,7 @@ from bench.checking.subject import Subject
 from bench.checking.words import on_agreement, on_kink, on_noise, on_plateau, on_unusable, remarks, undetermined
 from problems.errors import RoutesError
 
+BY_FAR = 1e-2
 SMALL = 1e-2  # a plateau below may be a loosely solved J: solvers are seldom looser
 
 
@@ -63,7 +64,10 @@ def _judged(so_far: Check, seen: Examination) -> Check:
 
 
 def _worst(readings: list[Reading]) -> Reading:
-    return max(readings, key=lambda r: r.off)
+    """The worst random direction, whose error is one of the whole gradient, unless a component is worse by far."""
+    worst = max(readings, key=lambda r: r.off)
+    whole = [r for r in readings if r.sweep.probe.index is None and r.off > BY_FAR * worst.off]
+    return max(whole, key=lambda r: r.off) if whole else worst
 
 
 def _clearest(readings: list[Reading]) -> Reading:

@@ -83,7 +83,7 @@ class Examination:
 
     def _wider(self, reading: Reading) -> Reading:
         """Where few steps could not tell, the same number again on the side where it gets better."""
-        if reading.says in ("agrees", "nothing") or not np.isfinite(reading.sweep.central).any():
+        if reading.says != "noise" or not reading.sweep.two_sided:
             return reading
         h, variation = reading.sweep.h, np.abs(np.diff(reading.sweep.off_central))
         below = np.nansum(variation[: len(variation) // 2]) < np.nansum(variation[len(variation) // 2 :])
