@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from problems.errors import InputError
+from problems.inherited import inherited
 from problems.problem import Array, Fields, Linearization, Offers, Operator, Parameters, ParameterView, Problem, Traced
 from problems.regularization import tikhonov_between, tikhonov_between_gradient
 from problems.supg import Supg, direction, inflow
@@ -100,9 +101,13 @@ class Advection(Problem):
         self._truth = truth if blank else None
         self.parameters = Parameters(start, scale, *bounds, unit, lambda e: f"{name}_{e + 1}", x)
 
-    def refined(self) -> Advection:
-        """The same with n doubled; a twin's data are still to be solved for, on its own mesh."""
-        return self._on_mesh(n=2 * self.n)
+    def refined(self, p: Array) -> tuple[Advection, Array]:
+        """Every cell in four; a twin's data are still to be solved for, on its own mesh."""
+        finer = self._on_mesh(n=2 * self.n)
+        x, x_fine = self.parameters.position, finer.parameters.position
+        assert x is not None
+        assert x_fine is not None
+        return finer, inherited(p, x, x_fine)
 
     # --- the physics
 

@@ -102,8 +102,24 @@ class Bar(Problem):
             label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
             position=self.x[:, None],
         )
+        self._shared: dict[str, Any] = {
+            "parametrization": parametrization, "alpha": alpha, "stop": stop, "gap": gap, "k_c": k_c, "width": width
+        }  # fmt: skip
+        self._look()
+
+    def _look(self) -> None:
+        """What the sensors leave unseen."""
         self.last_sensor = int(self.sensors.nodes.max(initial=0))
         self.notes = self._notes()
+
+    def refined(self, p: Array) -> tuple[Bar, Array] | None:
+        """Every element in two, the same data at the same places."""
+        if 2 * self.n > N_MAX:
+            return None
+        finer = Bar(n=2 * self.n, sensors=0, **self._shared)
+        finer.sensors, finer.synthetic = Sensors(2 * self.sensors.nodes, self.sensors.d), self.synthetic
+        finer._look()
+        return finer, np.repeat(p, 2)
 
     def _notes(self) -> tuple[str, ...]:
         n_blind, stop = self.n - self.last_sensor, self.stop

@@ -13,6 +13,7 @@ import numpy as np
 from problems import bodies, probes, unknowns
 from problems.elements import ElementName
 from problems.errors import InputError, check_applies
+from problems.inherited import inherited
 from problems.mechanics import Load, Mechanics
 from problems.problem import Array, Fields, Linearization, Offers, Operator, ParameterView, Problem, Traced
 from problems.supports import Supports, check_clamp
@@ -69,6 +70,7 @@ class Block(Problem):
         noise: Annotated[float, "standard deviation added to a twin's data [m]"] = 0.0,
         seed: Annotated[int, "of noise and markers"] = 0,
     ) -> None:
+        self._given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         _check_counts(n=n, nx=nx, ny=ny, nz=nz, layers=layers, cases=cases, markers=markers, seed=seed)
         check_applies(
             "block",
@@ -95,6 +97,7 @@ class Block(Problem):
             raise InputError(
                 f"block: {max(math.prod(cells), markers, layers):g} cells, markers or layers - at most {MOST:g}"
             )
+        self._cells = None if mesh else cells
         self.body = bodies.read("block", mesh) if mesh else bodies.box("block", element, cells, _lengths(size))
         body, top = self.body, self.body.surface(loaded)
         clamp = body.surface(clamped).node_set if clamped != "none" else np.zeros(0, dtype=int)
@@ -202,6 +205,17 @@ class Block(Problem):
         from problems.jax64 import jnp
 
         return Traced(residual=self.mechanics.traced_residual, objective=lambda u, p: self.objective(u, p, jnp))
+
+    def refined(self, p: Array) -> tuple[Block, Array] | None:
+        """Every cell of a box in eight, for unknowns that a finer box has, too; a twin is still to be solved for."""
+        unknown = self._given["unknown"]
+        if self._cells is None or unknown in ("traction", "shape"):
+            return None
+        nx, ny, nz = (2 * n for n in self._cells)
+        finer = Block(**self._given | {"n": 4, "nx": nx, "ny": ny, "nz": nz})
+        if unknown != "modulus":
+            return finer, p
+        return finer, inherited(p, self.body.geometry.centres, finer.body.geometry.centres)
 
     # --- synthetic data
 

@@ -238,8 +238,8 @@ class Problem:
         """Which smooth branch of a piecewise smooth R holds at (u, p), a word or a tuple; None where R is smooth."""
         return None
 
-    def refined(self) -> Problem | None:
-        """The same problem on a mesh of half the size, or None where it has no mesh."""
+    def refined(self, p: Array) -> tuple[Problem, Array] | None:
+        """The same problem on a mesh of half the size, and p there; None where it has no such mesh."""
         return None
 
     def integral(self, u: Array, p: Array) -> tuple[float, Array] | None:

@@ -132,7 +132,7 @@ def test_the_continuous_adjoint_misses_the_gradient_by_less_on_finer_meshes(opti
         assert advection.n == n
         p = advection.parameters.start
         errors.append(relative_error(continuous(advection, p), adjoint.prepare(Model(advection), p)(p).gradient))
-        advection = advection.refined()
+        advection, _ = advection.refined(advection.parameters.start)
     assert 1e-3 < errors[1] < 0.5
     assert (rates(errors) > 1.0).all()
     assert rates(errors)[-1] > 1.7  # tau = O(h^2) once cells are narrow: 1.9
@@ -156,7 +156,7 @@ def test_the_adjoint_advection_is_that_of_its_own_equation() -> None:
 
 def test_refined_is_the_same_on_half_the_mesh_size() -> None:
     coarse = Advection(n=3, angle=50.0, unknown="source", alpha=0.1, sensors="everywhere")
-    fine = coarse.refined()
+    fine, _ = coarse.refined(coarse.parameters.start)
     assert (fine.n, fine.alpha, fine.on_outflow) == (6, 0.1, False)
     assert fine.supg.length == pytest.approx(coarse.supg.length / 2)
     np.testing.assert_allclose(fine.supg.b, coarse.supg.b)

@@ -15,7 +15,7 @@ from bench.checking.guarded import Account, Guarded
 from bench.checking.locate import Located, Search, locate
 from bench.checking.plan import Plan
 from bench.checking.reading import Reading
-from bench.checking.result import Check, Refined, Tightened
+from bench.checking.result import Check, Refined
 from bench.checking.subject import Subject
 from bench.checking.words import on_agreement, on_kink, on_noise, on_plateau, on_unusable, remarks, undetermined
 from problems.errors import RoutesError
@@ -90,10 +90,10 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading, findings: tupl
     if tightened and settle.fell(worst, tightened[-1].reading):
         return on_plateau(replace(so_far, culprit=None if convicted is None else convicted.culprit), "solver-limited")
     by_mesh = convicted is None or convicted.by_mesh
-    refined = _refined(seen, worst) if by_mesh else None
+    refined, why_not = _refined(seen, worst) if by_mesh else (None, ())
     located = _located(seen, seen.readings)
     culprit = None if convicted is None else convicted.culprit
-    so_far = replace(so_far, located=located, refined=refined, culprit=culprit)
+    so_far = replace(so_far, located=located, refined=refined, culprit=culprit, findings=(*findings, *why_not))
     if refined is not None and refined.order >= settle.SHRINKS and not _local(located):
         return on_plateau(so_far, "inconsistent-discretization")
     if convicted is not None:
@@ -118,15 +118,17 @@ def _located(seen: Examination, readings: list[Reading]) -> Located:
     return locate(search, known, seen.subject)
 
 
-def _refined(seen: Examination, worst: Reading) -> Refined | None:
+def _refined(seen: Examination, worst: Reading) -> tuple[Refined | None, tuple[Finding, ...]]:
+    """The plateau on a finer mesh, or why it was not looked at there."""
     assert worst.level is not None
     if seen.subject.refine is None:
-        return None
+        return None, ()
     try:
         other = seen.subject.refine()
-        return None if other is None else settle.refine(seen, other, worst.level.h)
-    except RoutesError:
-        return None
-
-
-__all__ = ["Tightened", "check"]
+        refined = None if other is None else settle.refine(seen, other, worst.level.h)
+    except RoutesError as failure:
+        return None, (Finding("mesh refinement", float("nan"), settle.SHRINKS, str(failure)),)
+    if refined is None:
+        why = "no finer mesh for this unknown, or too few calls left"
+        return None, (Finding("mesh refinement", float("nan"), settle.SHRINKS, why),)
+    return refined, ()

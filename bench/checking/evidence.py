@@ -56,4 +56,4 @@ def complex_steps(seen: Examination) -> Iterator[Finding]:
         yield Finding("complex step", float("nan"), COMPLEX, str(failure))
         return
     off = float(np.linalg.norm(V.T @ seen.gradient - exact) / (np.linalg.norm(exact) or 1.0))
-    yield Finding("complex step", off, max(COMPLEX, seen.accepted if subject.accuracy else 0.0), f"{COUNT} directions")
+    yield Finding("complex step", off, max(COMPLEX, subject.accuracy), f"{COUNT} directions")

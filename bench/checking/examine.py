@@ -45,7 +45,7 @@ class Examination:
         repeated = np.array([v for v in values if np.isfinite(v)])
         J_0 = float(repeated.mean()) if repeated.size else float("nan")
         by_precision = PER_EPS * asked.eps if asked.eps > np.finfo(np.float64).eps else 0.0
-        allowed = max(EQUAL, accepted, subject.accuracy, by_precision)
+        allowed = max(EQUAL, accepted, by_precision)
         return cls(subject, plan, J, asked, J_0, repeated, allowed)
 
     @property
@@ -97,7 +97,8 @@ class Examination:
     def _reading(self, made: Sweep) -> Reading:
         alone = len(made.h) < len(self.plan.steps) and self.readings  # few steps tell less of J's noise than all do
         sigma = self.readings[0].noise if alone else noise(made, self.J.eps, self.repeated)
-        reading = Reading(made, sigma, self.size, self.accepted)
+        by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
+        reading = Reading(made, sigma, self.size, self.accepted, by_nature)
         active_set = self.subject.active_set
         if active_set is None:
             return reading

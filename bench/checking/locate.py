@@ -66,7 +66,7 @@ class Search:
         self.J, self.J_0, self.subject = J, J_0, subject
         self.gradient, self.w = gradient.copy(), subject.natural
         self.h = np.array([plateau.level.h])
-        self.allowed = max(DIFFERENT * plateau.level.uncertainty, plateau.accepted * plateau.size)
+        self.allowed = max(DIFFERENT * plateau.level.uncertainty, plateau.accepted * plateau.size, plateau.by_nature)
         self.rng = np.random.default_rng(seed)
         self.plateau = plateau
 
@@ -97,7 +97,8 @@ class Search:
             return None
         (probe,) = components(self.subject, [i])
         s = sweep(self.J, self.J_0, self.subject, self.gradient, probe, self.h * AROUND)
-        reading = Reading(s, self.plateau.noise, self.plateau.size, self.plateau.accepted)
+        like = self.plateau
+        reading = Reading(s, like.noise, like.size, like.accepted, like.by_nature)
         return wrong_component(reading, self.subject) if reading.says == "plateau" else None
 
 

@@ -27,7 +27,8 @@ class Reading:
 
     noise    standard deviation of J
     size     |g w|_2, what slopes along natural changes are to be compared with
-    accepted relative error that is none: of the gradient's precision or nature
+    accepted relative error that is none
+    by_nature error of slopes that is none: of gradients made of differences, say, which know nothing of components
     changes  step -> how often the active set changes inside its stencil, where the subject knows
     """
 
@@ -35,6 +36,7 @@ class Reading:
     noise: float
     size: float
     accepted: float
+    by_nature: float = 0.0
     changes: Callable[[float], int] | None = None
 
     @cached_property
@@ -110,7 +112,8 @@ class Reading:
             return "nothing"
         if self.kink is not None or self.inside:
             return "kink"
-        if self.off > max(DIFFERENT * self.known_to, self.accepted):
+        allowed = max(DIFFERENT * self.level.uncertainty, self.accepted * self.scale, self.by_nature)
+        if abs(self.level.value) > allowed:
             return "plateau"
         return "agrees" if self.known_to <= RESOLVED else "noise"
 

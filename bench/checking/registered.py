@@ -19,6 +19,7 @@ from routes.newton import Solver
 from routes.route import Options, Result, Route
 from routes.twin import with_synthetic_data
 
+LARGEST = 30_000  # unknowns of a finer mesh: some tens of forward solves there take a minute
 TIGHT = Solver(rtol=1e-14)  # of complex steps: a judge is no fellow of the judged
 
 
@@ -49,7 +50,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         position=parameters.position,
         tighten=lambda factor: subject(problem, route, _more(options), p, _tighter(solver, factor)),
         active_set=_active_set(problem, solver),
-        refine=_refined(problem, route, options, solver),
+        refine=_refined(problem, route, options, p, solver),
         slopes=(lambda V: complex_slopes(Model(problem, TIGHT), p, V)) if Offers.COMPLEX in offers else None,
         explain=(lambda g: explain(model, returned[0], p, g)) if Offers.LINEARIZE in offers else None,
         accuracy=route.accuracy,
@@ -85,17 +86,23 @@ def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable]
     return active_set
 
 
-def _refined(problem: Problem, route: Route, options: Options, solver: Solver) -> Callable[[], Subject | None] | None:
-    """The route on the problem with half the mesh size, at its own start."""
+def _refined(
+    problem: Problem, route: Route, options: Options, p: Array, solver: Solver
+) -> Callable[[], Subject | None] | None:
+    """The route on the problem with half the mesh size. Raises InputError where that has too many unknowns."""
     if type(problem).refined is Problem.refined:
         return None
 
     def refine() -> Subject | None:
-        finer = problem.refined()
-        if finer is None:
+        found = problem.refined(p)
+        if found is None:
             return None
-        finer = with_synthetic_data(finer)
-        return subject(finer, route, options, finer.parameters.start.copy(), solver)
+        finer, q = found
+        if finer.n_state > LARGEST:
+            raise InputError(
+                f"{finer.n_state} unknowns on the finer mesh, {LARGEST} at most - start from a coarser one"
+            )
+        return subject(with_synthetic_data(finer), route, options, q, solver)
 
     return refine
 

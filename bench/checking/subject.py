@@ -28,7 +28,7 @@ class Subject:
     refine      () -> the same subject on a mesh of half the size
     slopes      V (n_p, m) -> V^T dJ/dp by complex steps, which need no step size
     explain     gradient -> findings on the factors it is made of
-    accuracy    relative error that the gradient may have by its nature, as one by finite differences has
+    accuracy    error that the gradient may have by its nature, as one by finite differences has, relative to |g w| or J
     """
 
     name: str
