@@ -21,6 +21,7 @@ from bench.checking.words import on_agreement, on_kink, on_noise, on_plateau, on
 from problems.errors import RoutesError
 
 BY_FAR = 1e-2
+MANY = 3  # right components for every wrong one
 SMALL = 1e-2  # a plateau below may be a loosely solved J: solvers are seldom looser
 
 
@@ -64,10 +65,13 @@ def _judged(so_far: Check, seen: Examination) -> Check:
 
 
 def _worst(readings: list[Reading]) -> Reading:
-    """The worst random direction, whose error is one of the whole gradient, unless a component is worse by far."""
+    """The line swept most widely and worst along a random direction, unless a component is worse by far.
+
+    Along random directions an error is one of the whole gradient.
+    """
     worst = max(readings, key=lambda r: r.off)
     whole = [r for r in readings if r.sweep.probe.index is None and r.off > BY_FAR * worst.off]
-    return max(whole, key=lambda r: r.off) if whole else worst
+    return max(whole, key=lambda r: (len(r.sweep.h), r.off)) if whole else worst
 
 
 def _clearest(readings: list[Reading]) -> Reading:
@@ -98,14 +102,14 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading, findings: tupl
         return on_plateau(so_far, "inconsistent-discretization")
     if convicted is not None:
         return on_plateau(so_far, "wrong-gradient")
-    if not tightened and max([worst.off, *(w.off for w in located.worst if _local(located))]) < SMALL:
+    if not tightened and worst.off < SMALL and not _local(located):
         return on_plateau(so_far, "undetermined")
     return on_plateau(so_far, "wrong-gradient")
 
 
 def _local(located: Located) -> bool:
-    """Few components are wrong and the others right: no matter of discretization."""
-    return bool(located.worst) and located.others_right and len(located.worst) <= 4
+    """Few components are wrong and many others right: no matter of a mesh, nor of a loosely solved J."""
+    return bool(located.worst) and located.right >= MANY * len(located.worst)
 
 
 def _located(seen: Examination, readings: list[Reading]) -> Located:

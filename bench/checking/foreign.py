@@ -97,7 +97,7 @@ def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:
     if len(pair) == n_p != 2 and all(np.size(b) == 2 for b in pair):  # SciPy's list of pairs, None for no bound
         pair = [[b[k] for b in pair] for k in (0, 1)]
     if len(pair) != 2:
-        raise InputError("check: bounds are (lower, upper), numbers or arrays (n_p,), or one pair a parameter")
+        raise InputError(f"check: bounds={bounds!r} - give (lower, upper), numbers or arrays, or one pair a parameter")
     ends = [_without_none(end, limit) for end, limit in zip(pair, (-np.inf, np.inf), strict=True)]
     lower, upper = (vector(end, n_p, f"bounds[{k}]") for k, end in enumerate(ends))
     return lower, upper

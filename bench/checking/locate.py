@@ -41,10 +41,10 @@ class Worst:
 
 @dataclass(frozen=True)
 class Located:
-    """worst components, largest first; whether the others were then found right; `everywhere`: many are wrong."""
+    """worst components, largest first; right: how many others were then found right; everywhere: many are wrong."""
 
     worst: tuple[Worst, ...]
-    others_right: bool = False
+    right: int = 0
     everywhere: bool = False
 
     @property
@@ -113,7 +113,7 @@ def locate(search: Search | None, known: Sequence[Reading], subject: Subject) ->
         return _sorted(worst, everywhere=True)
     looked_at = [r.sweep.probe.index for r in known if r.sweep.probe.index is not None]
     if len(looked_at) == n_p:
-        return _sorted(worst, others_right=True)
+        return _sorted(worst, right=n_p - len(worst))
     for w in worst:
         search.gradient[w.index] = w.found
     others = np.setdiff1d(np.arange(n_p), looked_at)
@@ -121,7 +121,7 @@ def locate(search: Search | None, known: Sequence[Reading], subject: Subject) ->
         if search.J.left() < 2:
             return _sorted(worst)
         if not search.wrong(others):
-            return _sorted(worst, others_right=True)
+            return _sorted(worst, right=n_p - len(worst))
         i = search.one(others)
         found = None if i is None else search.measure(i)
         if found is None:
@@ -140,5 +140,5 @@ def wrong_component(reading: Reading, subject: Subject) -> Worst:
     return Worst(subject.label(i), i, reading.slope / w, quotient / w)
 
 
-def _sorted(worst: list[Worst], **how: bool) -> Located:
-    return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), **how)
+def _sorted(worst: list[Worst], right: int = 0, everywhere: bool = False) -> Located:
+    return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), right, everywhere)

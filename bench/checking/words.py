@@ -96,13 +96,13 @@ def on_plateau(check: Check, verdict: Verdict) -> Check:
     if check.refined is not None:
         says += f", nor with the mesh (h^{check.refined.order:.1f})"
     if located is not None and located.worst:
-        says += f"; {_components(located, len(line.sweep.probe.v))}"
+        says += f"; {_components(located)}"
         culprit = culprit or _component_culprit(located)
     if verdict == "undetermined":
         says += "; so small a plateau may be a loosely solved J as well as a small wrong term"
         return replace(check, verdict=verdict, says=says, todo=TIGHTEN, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
-    if not check.tightened and not (located is not None and located.others_right):
+    if not check.tightened and not (located is not None and located.right):
         todo += f"; to rule out the solver, {TIGHTEN}"
     return replace(check, verdict=verdict, says=says, todo=todo, culprit=culprit)
 
@@ -182,15 +182,14 @@ def _tighten_for_good(check: Check) -> str:
     return f"{todo}; look at {check.culprit}" if check.culprit else todo
 
 
-def _components(located: Located, n_p: int) -> str:
+def _components(located: Located) -> str:
     w = located.worst[0]
     named = ", ".join(x.name for x in located.worst[:SHOWN])
     if located.everywhere and located.factor is not None:
         return f"all components looked at ({named}) are off by {_factor(located.factor)}"
     if located.everywhere:
         return f"many components are wrong, {named} among them: {_pair(w)}"
-    others = n_p - len(located.worst)
-    rest = f", the other {others} are right" if located.others_right and others else ""
+    rest = f", the other {located.right} are right" if located.right else ""
     return f"{named}: {_pair(w)}{rest}"
 
 
@@ -200,7 +199,9 @@ def _pair(w: Worst) -> str:
 
 
 def _factor(factor: float) -> str:
-    """A factor next to 1 is told by its distance."""
+    """A factor next to 1 is told by its distance, -1 by its name."""
+    if abs(factor + 1.0) < NEXT_TO_ONE**2:
+        return "its sign"
     return f"the factor {factor:.3g}" if abs(factor - 1.0) >= NEXT_TO_ONE else f"{abs(factor - 1.0):.1e} of it"
 
 

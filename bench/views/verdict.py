@@ -116,7 +116,9 @@ def evidence(findings: Sequence[Finding]) -> Table:
         value = "" if np.isnan(f.value) else f"{f.value:.1e}"
         style = {True: "", False: "red", None: "dim"}[f.sound]
         said = "; ".join(filter(None, (f.says, f.culprit)))
-        table.add_row(Text(f.name), value, f"{f.limit:.0e}", Text(MARKS[f.sound], style=style), Text(said), style=style)
+        table.add_row(
+            Text(f.name), value, number(f.limit, 2), Text(MARKS[f.sound], style=style), Text(said), style=style
+        )
     return table
 
 

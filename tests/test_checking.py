@@ -1,0 +1,422 @@
+"""Verdicts on other people's code: right ones, wrong ones, noisy, kinked, hostile ones."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from bench import assert_gradient, check
+from bench.checking.curve import fit
+from bench.checking.foreign import subject_of
+from bench.checking.plateau import level
+from bench.checking.result import EXIT, Check
+from bench.rows import clean
+from problems.errors import InputError
+from problems.problem import Array
+
+N = 1000
+A = np.random.default_rng(0).uniform(0.5, 2.0, N)
+P = np.random.default_rng(1).uniform(0.2, 1.0, N)
+
+
+def J(p: Array) -> float:
+    return float(np.sum(A * np.sin(p) + 0.1 * p**3))
+
+
+def dJ(p: Array) -> Array:
+    return A * np.cos(p) + 0.3 * p**2
+
+
+def wrong(index: object, factor: float):
+    def gradient(p: Array) -> Array:
+        g = dJ(p)
+        g[index] *= factor
+        return g
+
+    return gradient
+
+
+def noisy(size: float, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    return lambda p: J(p) * (1.0 + size * rng.standard_normal())
+
+
+# --- a black box of a thousand parameters
+
+
+def test_a_right_gradient_of_a_thousand_parameters_costs_few_calls() -> None:
+    found = check(J, dJ, P)
+    assert (found.verdict, found.exit_code) == ("agrees", 0)
+    assert found.calls <= 200
+    assert found.gradients == 1
+    line = found.deciding
+    assert line.central.floor < 1e-9
+    assert line.central.slope == pytest.approx(2.0, abs=0.1)
+    assert line.one_sided.slope == pytest.approx(1.0, abs=0.1)
+    assert line.central.roundoff == pytest.approx(-1.0, abs=0.2)  # noise: its slope scatters
+
+
+@pytest.mark.parametrize(("index", "factor"), [(417, 2.0), (0, -1.0), (999, 0.0), (511, 1.01)])
+def test_one_wrong_component_in_a_thousand_is_found(index: int, factor: float) -> None:
+    found = check(J, wrong(index, factor), P)
+    assert (found.verdict, found.exit_code) == ("wrong-gradient", 1)
+    assert found.calls <= 200
+    (worst,) = found.located.worst
+    assert worst.index == index
+    assert worst.factor == pytest.approx(factor, abs=1e-6)
+    assert found.located.right == N - 1
+    assert f"p_{index + 1}" in found.culprit
+
+
+def test_three_wrong_components_are_found_within_the_budget() -> None:
+    found = check(J, wrong([3, 417, 900], -1.0), P)
+    assert {w.index for w in found.located.worst} == {3, 417, 900}
+    assert found.located.right == N - 3
+    assert found.calls <= 200
+
+
+def test_a_factor_on_everything_is_called_by_its_name() -> None:
+    found = check(J, wrong(slice(None), 2.0), P)
+    assert found.verdict == "wrong-gradient"
+    assert found.located.factor == pytest.approx(2.0)
+    assert found.culprit == "the whole gradient, off by the factor 2"
+
+
+def test_a_smaller_budget_says_less_and_says_so() -> None:
+    found = check(J, wrong(417, 2.0), P, budget=50)
+    assert found.calls <= 50
+    assert found.verdict == "wrong-gradient"
+    assert any("budget of 50 calls is spent" in remark for remark in found.remarks)
+
+
+# --- noise
+
+
+def test_the_noise_of_J_is_estimated_from_its_own_values() -> None:
+    found = check(noisy(1e-8), dJ, P)
+    assert found.verdict == "agrees"
+    assert found.noise == pytest.approx(1e-8 * abs(J(P)), rel=0.7)  # of six values and running medians
+    assert any("not deterministic" in remark for remark in found.remarks)
+
+
+def test_noise_hides_no_large_mistake() -> None:
+    found = check(noisy(1e-8), wrong(5, 3.0), P)
+    assert found.verdict == "wrong-gradient"
+    assert [w.index for w in found.located.worst] == [5]
+
+
+def test_noise_that_leaves_no_step_is_inconclusive() -> None:
+    found = check(noisy(1e-3), dJ, P)
+    assert (found.verdict, found.exit_code) == ("noise-limited", 3)
+    assert "nothing can be told" in found.says
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_one_dead_point_decides_nothing(seed: int) -> None:
+    """A value that is garbage now and then: one in fifty."""
+    rng = np.random.default_rng(seed)
+
+    def objective(p: Array) -> float:
+        return J(p) * (1.5 if rng.random() < 0.02 else 1.0)
+
+    found = check(objective, dJ, P)
+    assert found.verdict in ("agrees", "noise-limited")  # J(p) itself may be one of the dead
+
+
+def test_float32_is_judged_as_float32() -> None:
+    found = check(J, lambda p: dJ(p).astype(np.float32), P)
+    assert found.verdict == "agrees"
+    assert any("gradient is float32" in remark for remark in found.remarks)
+    found = check(lambda p: np.float32(J(p)), dJ, P)
+    assert found.verdict == "agrees"
+    assert any("J has the precision of float32" in remark for remark in found.remarks)
+    assert check(J, lambda p: 1.001 * dJ(p).astype(np.float32), P).verdict != "agrees"
+
+
+# --- scales
+
+
+def test_components_eighteen_orders_apart_are_judged_each_on_its_own_scale() -> None:
+    def objective(p: Array) -> float:
+        return float((p[0] - 1.0) ** 2 + (1e18 * p[1] - 2.0) ** 2)
+
+    def gradient(p: Array, factor: float = 1.0) -> Array:
+        return np.array([2.0 * (p[0] - 1.0), factor * 2e18 * (1e18 * p[1] - 2.0)])
+
+    p = np.array([3.0, 1e-18])
+    assert check(objective, gradient, p).verdict == "agrees"
+    found = check(objective, lambda p: gradient(p, 2.0), p)
+    assert found.verdict == "wrong-gradient"
+    assert [(w.index, round(w.factor, 6)) for w in found.located.worst] == [(1, 2.0)]
+
+
+def test_a_small_component_that_is_wrong_is_seen_beside_large_ones() -> None:
+    found = check(lambda p: float(p[0] ** 2 + 1e-4 * p[1] + p[2]), lambda p: np.array([2 * p[0], 0.0, 1.0]), np.ones(3))
+    assert found.verdict == "wrong-gradient"
+    assert [w.index for w in found.located.worst] == [1]
+
+
+def test_a_zero_component_has_a_scale_that_is_said() -> None:
+    found = check(lambda p: float(p[0] ** 2), lambda p: np.array([2 * p[0], 0.0]), np.ones(2))
+    assert found.verdict == "agrees"
+    assert any("relative to the whole gradient" in remark and "p_2" in remark for remark in found.remarks)
+
+
+def test_a_zero_gradient_is_right_where_nothing_changes_and_wrong_where_something_does() -> None:
+    assert check(lambda p: 5.0, lambda p: 0.0 * p, np.ones(3)).verdict == "agrees"
+    assert check(lambda p: 5.0 + 1e-6 * p[0], lambda p: 0.0 * p, np.ones(3)).verdict == "wrong-gradient"
+    assert check(lambda p: 0.0, lambda p: 0.0 * p, np.ones(3)).verdict == "agrees"
+
+
+# --- kinks
+
+
+def kinked(p: Array) -> float:
+    return float(np.abs(p).sum() + p[0] ** 2)
+
+
+def kinked_gradient(p: Array) -> Array:
+    return np.sign(p) + np.array([2.0 * p[0], 0.0, 0.0])
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e-14])
+def test_a_kink_at_p_is_non_smooth(distance: float) -> None:
+    found = check(kinked, kinked_gradient, np.array([1.0, distance, 2.0]), scale=np.ones(3))
+    assert (found.verdict, found.exit_code) == ("non-smooth", 3)
+    assert "converge to numbers" in found.says
+
+
+@pytest.mark.parametrize("distance", [1e-1, 1e-4, 1e-8])
+def test_a_kink_nearby_is_none_at_p(distance: float) -> None:
+    p = np.array([1.0, distance, 2.0])
+    assert check(kinked, kinked_gradient, p, scale=np.ones(3)).verdict == "agrees"
+    assert check(kinked, lambda p: 1.1 * kinked_gradient(p), p, scale=np.ones(3)).verdict == "wrong-gradient"
+
+
+def test_active_sets_tell_of_a_kink_that_quotients_see() -> None:
+    found = check(
+        kinked, kinked_gradient, np.array([1.0, 0.0, 2.0]), active_set=lambda p: tuple(p > 0), scale=np.ones(3)
+    )
+    assert found.verdict == "non-smooth"
+    assert found.as_dict()["active_set_changes"] == 1
+
+
+# --- loosely solved objectives
+
+
+def loosely(tolerance: float):
+    """J = sum x^3 with x^2 = p by damped Newton steps that stop early; the gradient is that of the solution."""
+
+    def solve(p: Array) -> Array:
+        x = np.ones_like(p)
+        while np.abs(x * x - p).max() > max(tolerance, 1e-15):
+            x = x - (x * x - p) / (4.0 * x)
+        return x
+
+    return (lambda p: float((solve(p) ** 3).sum())), (lambda p: 1.5 * np.sqrt(p))
+
+
+ROOTS = np.array([2.0, 3.0])
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def test_a_plateau_that_falls_with_the_tolerance_is_the_solvers(tolerance: float) -> None:
+    found = check(*loosely(tolerance), ROOTS, tighten=lambda factor: loosely(tolerance * factor))
+    assert (found.verdict, found.exit_code) == ("solver-limited", 3)
+    assert "the gradient is sound, J is loosely solved" in found.says
+    assert found.tightened_plateau < 0.1 * found.plateau
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def test_a_wrong_term_stays_when_the_solver_is_tightened(tolerance: float) -> None:
+    def tightened(factor: float):
+        objective, gradient = loosely(tolerance * factor)
+        return objective, lambda p: 1.05 * gradient(p)
+
+    found = check(*tightened(1.0), ROOTS, tighten=tightened)
+    assert found.verdict == "wrong-gradient"
+    assert found.tightened_plateau == pytest.approx(found.plateau, rel=0.5)  # less what was the solver's
+    assert [w.factor for w in found.located.worst] == pytest.approx([1.05, 1.05], rel=2 * tolerance)
+
+
+def test_a_small_plateau_without_a_way_to_tighten_is_undetermined() -> None:
+    found = check(*loosely(1e-4), ROOTS)
+    assert (found.verdict, found.exit_code) == ("undetermined", 3)
+    assert "tighten(factor)" in found.todo
+
+
+# --- hostile code
+
+
+def test_accidents_are_reported_with_their_point() -> None:
+    found = check(lambda p: float(np.log(p).sum()), lambda p: 1.0 / p, np.array([1e-3, 1.0]), scale=np.ones(2))
+    assert found.verdict == "agrees"
+    assert any("points left out" in remark and "J = nan" in remark and "p_1 = " in remark for remark in found.remarks)
+
+
+def boom(p: Array) -> float:
+    raise ValueError("the mesh\nis gone")
+
+
+@pytest.mark.parametrize(
+    ("objective", "gradient", "verdict", "says"),
+    [
+        (boom, dJ, "undetermined", "ValueError: the mesh is gone"),
+        (J, boom, "undetermined", "the gradient raises ValueError: the mesh is gone"),
+        (lambda p: float("nan"), dJ, "undetermined", "J = nan"),
+        (lambda p: "many", dJ, "undetermined", "not one real number"),
+        (lambda p: np.ones(2), dJ, "undetermined", "shape (2,)"),
+        (lambda p: 1j, dJ, "undetermined", "complex128"),
+        (J, lambda p: dJ(p)[:-1], "wrong-gradient", "shape (999,) for 1000 parameters"),
+        (J, lambda p: dJ(p) * 1j, "wrong-gradient", "complex128"),
+        (J, lambda p: np.full(N, np.nan), "wrong-gradient", "1000 of 1000 components"),
+        (J, lambda p: None, "wrong-gradient", "object"),
+        (lambda p: exit(3), dJ, "undetermined", "SystemExit"),
+    ],
+)
+def test_what_is_no_number_is_said(objective, gradient, verdict: str, says: str) -> None:
+    found = check(objective, gradient, P)
+    assert found.verdict == verdict
+    assert says in found.says
+    assert "\n" not in found.says
+
+
+def test_an_objective_that_changes_p_gets_copies() -> None:
+    def objective(p: Array) -> float:
+        p *= 2.0
+        return float((p**2).sum())
+
+    start = np.ones(3)
+    found = check(objective, lambda p: 8.0 * p, start)
+    assert found.verdict == "agrees"
+    assert (start == 1.0).all()
+    assert any("changes p in place" in remark for remark in found.remarks)
+
+
+def test_what_is_printed_stays_off_stdout(capsys: pytest.CaptureFixture[str]) -> None:
+    def objective(p: Array) -> float:
+        print("iteration 1")
+        return J(p)
+
+    check(objective, dJ, P)
+    assert capsys.readouterr().out == ""
+
+
+def test_bounds_are_never_left() -> None:
+    asked: list[Array] = []
+
+    def objective(p: Array) -> float:
+        asked.append(p.copy())
+        return float(np.sqrt(p - 1.0 + 1e-2).sum())
+
+    start = np.array([1.0, 2.0, 3.0])
+    found = check(objective, lambda p: 0.5 / np.sqrt(p - 1.0 + 1e-2), start, bounds=(1.0, [3.0, 3.0, 3.0]))
+    assert found.verdict == "agrees"
+    assert all(((p >= 1.0) & (p <= 3.0)).all() for p in asked)
+    assert any("on their bounds" in remark and "p_1" in remark for remark in found.remarks)
+    found = check(objective, lambda p: 0.6 / np.sqrt(p - 1.0 + 1e-2), start, bounds=(1.0, 3.0))
+    assert found.verdict == "wrong-gradient"
+
+
+# --- what may be given, and how
+
+
+class Model:
+    start = np.array([0.3, 0.7])
+    names = ("stiffness", "damping")
+
+    def value_and_gradient(self, p: Array) -> tuple[float, Array]:
+        return float(p[0] ** 2 * p[1]), np.array([2.0 * p[0] * p[1], p[0] ** 2])
+
+
+@pytest.mark.parametrize("thing", [Model, Model(), lambda: Model()])
+def test_an_object_a_class_or_a_factory_may_be_given(thing) -> None:
+    assert check(thing).verdict == "agrees"
+
+
+def test_names_are_used() -> None:
+    class Wrong(Model):
+        def value_and_gradient(self, p: Array) -> tuple[float, Array]:
+            J, g = super().value_and_gradient(p)
+            return J, g * [1.0, 2.0]
+
+    found = check(Wrong)
+    assert found.culprit == "component damping, off by the factor 2"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"start": [[1.0]]}, "shape (1, 1)"),
+        ({"start": []}, "shape (0,)"),
+        ({"start": [1.0, np.nan]}, "start[1] is NaN"),
+        ({"start": [1.0, np.inf]}, "start[1] is not finite"),
+        ({"start": ["a"]}, "no array of real numbers"),
+        ({"start": [1.0], "scale": [0.0]}, "give scales > 0"),
+        ({"start": [1.0], "scale": [1.0, 2.0]}, "give 1 of them"),
+        ({"start": [1.0], "bounds": (2.0, 3.0)}, "outside its bounds 2 to 3"),
+        ({"start": [1.0], "bounds": 3.0}, "give (lower, upper)"),
+        ({"start": [1.0], "names": ["a", "b"]}, "2 names for 1 parameters"),
+        ({"start": [1.0], "budget": 3}, "give at least 20"),
+        ({"start": [1.0], "seed": -1}, "whole number >= 0"),
+        ({}, "no start"),
+    ],
+)
+def test_what_cannot_be_asked_is_one_line(arguments: dict, says: str) -> None:
+    with pytest.raises(InputError) as caught:
+        check(lambda p: float(p.sum()), lambda p: np.ones_like(p), **arguments)
+    assert says in str(caught.value)
+    assert " - " in str(caught.value)
+
+
+def test_bounds_may_be_pairs_as_scipys_are() -> None:
+    subject = subject_of(type("O", (Model,), {"bounds": [(0.0, None), (None, 1.0)]}), "O")
+    assert subject.lower.tolist() == [0.0, -np.inf]
+    assert subject.upper.tolist() == [np.inf, 1.0]
+
+
+def test_assert_gradient_raises_with_the_sentence() -> None:
+    assert_gradient(J, dJ, P)
+    with pytest.raises(AssertionError, match=r"wrong-gradient: a plateau .* p_418"):
+        assert_gradient(J, wrong(417, 2.0), P)
+
+
+@pytest.mark.parametrize("gradient", [dJ, wrong(3, 2.0), lambda p: np.ones(3)])
+def test_the_answer_as_json_has_all_its_keys(gradient) -> None:
+    found: Check = check(J, gradient, P)
+    keys = "verdict floor best_step slope_one_sided slope_central noise plateau tightened_plateau culprit"
+    back = json.loads(json.dumps(clean(found.as_dict()), allow_nan=False))
+    assert {*keys.split(), "worst_components", "calls"} <= back.keys()
+    assert set(EXIT.values()) == {0, 1}
+
+
+# --- the parts
+
+
+def test_a_level_is_the_limit_of_small_steps() -> None:
+    """Quotients settle on 1 for large steps and on 2 for small ones: the derivative is 2."""
+    h = 10.0 ** np.arange(-12, 0.1, 0.25)
+    q = np.where(h < 1e-6, 2.0, 1.0) + 1e-12 / h * np.sin(np.arange(len(h)))
+    found = level(h, q, 1e-13, 1e-3)
+    assert found.value == pytest.approx(2.0, abs=1e-4)
+    assert abs(found.value - 2.0) <= found.uncertainty
+
+
+def test_no_level_without_points() -> None:
+    h = 10.0 ** np.arange(-6.0, 0.0)
+    assert level(h, np.full(6, np.nan), 0.0, 1.0) is None
+    assert level(h, np.array([1.0, np.nan, np.nan, np.nan, np.nan, 1.0]), 0.0, 1.0) is None
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_slopes_and_floors_of_made_up_curves(order: int) -> None:
+    h = 10.0 ** np.arange(-14.0, 0.1, 0.25)
+    noise = 1e-15
+    curve = fit(h, h**order + noise / h, noise)
+    assert curve.slope == pytest.approx(order, abs=0.02)
+    assert curve.roundoff == pytest.approx(-1.0, abs=0.02)
+    best = (noise / order) ** (1.0 / (order + 1))
+    assert abs(np.log10(curve.best_step / best)) < 0.3
+    assert curve.floor < 2.0 * (best**order + noise / best)
