@@ -1,4 +1,4 @@
-"""Colours: a route has the same one everywhere, told apart by the colour-blind (Okabe & Ito 2008)."""
+"""Colours and marks: a route has the same one everywhere, told apart by the colour-blind (Okabe & Ito 2008)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,16 @@ ROUTES = {
     "unrolled-ad": "#CC79A7",
     "implicit-ad": "#F0E442",
 }
+
+MARKS = {
+    "fd-one-sided": "1",
+    "fd-central": "2",
+    "complex-step": "C",
+    "tangent": "T",
+    "adjoint": "A",
+    "unrolled-ad": "U",
+    "implicit-ad": "I",
+}  # in plots
 
 
 def route_style(name: str) -> str:
