@@ -27,6 +27,7 @@ from bench.commands.shared import (
     solver_of,
     store_option,
 )
+from bench.commands.tolerance import tolerance
 from problems.errors import DomainError, InputError
 
 if TYPE_CHECKING:
@@ -260,3 +261,6 @@ def report(store: Path) -> None:
     from bench.store import Store
 
     show(Store(store).rows())
+
+
+main.add_command(tolerance)
