@@ -28,6 +28,7 @@ from bench.commands.shared import (
     store_option,
 )
 from bench.commands.tolerance import tolerance
+from bench.commands.unrolling import unrolling
 from problems.errors import DomainError, InputError
 
 if TYPE_CHECKING:
@@ -264,3 +265,4 @@ def report(store: Path) -> None:
 
 
 main.add_command(tolerance)
+main.add_command(unrolling)

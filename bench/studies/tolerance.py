@@ -10,15 +10,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass, field
-from typing import Any
 
 import numpy as np
 
-from bench.accuracy import Judge
 from bench.bill import Prices, prices, unaffordable
 from bench.case import ProblemSpec, RouteSpec
 from bench.rows import Row
-from bench.runner import Settings, Workbench
+from bench.studies.judged import Bench, said
 from problems.errors import InputError, RoutesError
 from problems.problem import Array, Offers, Problem
 from routes.factorization import LinearSolver
@@ -26,7 +24,6 @@ from routes.model import Model
 from routes.newton import Solver, norm
 from routes.route import Options, Result, Route
 
-TIGHT = Solver(rtol=1e-13, adjoint_rtol=1e-13)  # of the judges, solved directly
 FEW = 32  # unknowns up to which conjugate gradients are exact before they are accurate
 
 
@@ -109,7 +106,7 @@ def tolerance(
 
     A route predicted to take more than `budget` seconds in all is skipped. Raises InputError, DomainError.
     """
-    bench = Workbench(problem, Settings(at=at, budget=budget, solver=TIGHT))
+    bench = Bench(problem, at, budget)
     linear_solver = linear_solver or default_solver(bench.problem)
     experiment = Experiment(bench, sweep, linear_solver, budget)
     with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
@@ -128,10 +125,9 @@ def default_solver(problem: Problem) -> LinearSolver:
 class Experiment:
     """One problem at one p under a sweep."""
 
-    def __init__(self, bench: Workbench, sweep: Sweep, linear_solver: LinearSolver, budget: float) -> None:
+    def __init__(self, bench: Bench, sweep: Sweep, linear_solver: LinearSolver, budget: float) -> None:
         self.bench, self.problem, self.p = bench, bench.problem, bench.p
         self.sweep, self.linear_solver, self.budget = sweep, linear_solver, budget
-        self.J = bench.objective()
         self._priced: Prices | None = None
         self._residuals: dict[float, float | None] = {}
 
@@ -140,7 +136,7 @@ class Experiment:
         try:
             reason = route.objection(self.problem, **options) or self._unaffordable(route, options)
         except Exception as failure:
-            yield Point(route.name, options, status="failed", reason=_said(failure))
+            yield Point(route.name, options, status="failed", reason=said(failure))
             return
         if reason is not None:
             yield Point(route.name, options, status="skipped", reason=reason)
@@ -160,22 +156,15 @@ class Experiment:
             model = Model(self.problem, solver)
             options = route.resolve(model, self.p, **options)
             result = route.prepare(model, self.p, **options)(self.p)
-            return Point(route.name, options, rtol, adjoint_rtol, **self._judged(route, result, solver))
+            measured = self.bench.errors(route, result) | self._achieved(result, solver)
+            return Point(route.name, options, rtol, adjoint_rtol, **measured)
         except Exception as failure:
-            return Point(route.name, options, rtol, adjoint_rtol, "failed", _said(failure))
+            return Point(route.name, options, rtol, adjoint_rtol, "failed", said(failure))
 
-    def _judged(self, route: Route, result: Result, solver: Solver) -> dict[str, Any]:
-        g, J = np.asarray(result.gradient), result.J
-        if g.shape != self.p.shape or not np.isfinite(g).all():
-            raise RoutesError(f"{route.name}: no finite gradient of {self.p.size} components - tighten the tolerance")
-        judge = self.bench.judges.judge(route)
-        error, reference = judge.error(g) if isinstance(judge, Judge) else (None, None)
+    def _achieved(self, result: Result, solver: Solver) -> dict[str, float | None]:
+        known = result.residual
         return {
-            "objective": J,
-            "objective_error": None if J is None or self.J == 0.0 else abs(J - self.J) / abs(self.J),
-            "gradient_error": error,
-            "reference": reference,
-            "residual": self._residual(solver) if result.residual is None else float(result.residual),
+            "residual": self._residual(solver) if known is None else float(known),
             "adjoint_residual": self._adjoint_residual(result),
         }
 
@@ -217,8 +206,3 @@ class Experiment:
             assert failure is not None
             raise failure
         return self._priced
-
-
-def _said(failure: Exception) -> str:
-    said = " ".join(str(failure).split())
-    return said if isinstance(failure, RoutesError) else f"{type(failure).__name__}: {said}"
