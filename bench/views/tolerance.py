@@ -18,6 +18,8 @@ SWEPT = {
     "forward": "tolerance of forward solves, linearized and adjoint ones at",
     "adjoint": "tolerance of linearized and adjoint solves, forward ones at",
 }
+EXACT = 1e-6  # of the tolerance asked for
+JUMPED = "forward solves are exact at the loosest tolerance: --linear-solver descent takes it step by step"
 LEGEND = (
     "residual: |R| / |R_0| achieved, adjoint: |R_u^T lam + J_u| / |J_u|, J: |J - J_ref| / |J_ref|, each of the first"
     " route that tells it\nthen |g - g_ref| / |g_ref| by route; floor: the least of a column"
@@ -31,6 +33,8 @@ def show(rows: Sequence[Row], plotted: bool = True) -> None:
         out.print(curves(measured, out.width))
         out.print()
     if measured:
+        title = f"{tables.named('problem', rows[0])}, {rows[0]['linear_solver']}: {_axis(rows[0])}"
+        out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)
     for line in remarks(rows):
@@ -81,8 +85,6 @@ def table(rows: Sequence[Row]) -> Table:
     """One line a tolerance: what the solves achieved, then the error of every route."""
     routes = by_route(rows)
     out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    title = f"{tables.named('problem', rows[0])}, {rows[0]['linear_solver']}: {_axis(rows[0])}"
-    out.title, out.title_justify, out.title_style = Text(title), "left", "bold"
     for name in ("tolerance", "residual", "adjoint", "J"):
         out.add_column(name, justify="right", no_wrap=True)
     for name, of in routes.items():
@@ -115,10 +117,18 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
             reason = row["reason"] if row["reason"].startswith(row["route"]) else f"{row['route']}: {row['reason']}"
             tolerances = at.setdefault((row["status"], reason, row["route"]), [])
             tolerances += [] if row["rtol"] is None else [swept(row)]
-    return [
+    lines = [
         Text(
             f"{status}{' at ' + ', '.join(f'{t:.2g}' for t in where) if where else ''}: {reason}",
             style="dim" if status == "skipped" else "red",
         )
         for (status, reason, _), where in at.items()
     ]
+    return lines + ([Text(f"note: {JUMPED}", style="italic")] if _jumped(rows) else [])
+
+
+def _jumped(rows: Sequence[Row]) -> bool:
+    """Whether forward solves were swept that are exact at the loosest tolerance already."""
+    swept = [row for row in rows if row["residual"] is not None and row["sweep"] != "adjoint"]
+    loosest = max((row["rtol"] for row in swept), default=0.0)
+    return any(row["rtol"] == loosest and row["residual"] < EXACT * loosest for row in swept)

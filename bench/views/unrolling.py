@@ -27,6 +27,10 @@ def show(iterates: Sequence[Row], curves: Sequence[Row], plotted: bool = True) -
     if plotted:
         out.print(plots(iterates, out.width))
         out.print()
+    first = iterates[0]
+    steps = f", {first['newton']} Newton steps" if first["newton"] else ""
+    title = f"{tables.named('problem', first)}, unrolled-ad[inner={first['inner']}]{steps}"
+    out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
     tables.show(out, table(iterates))
     for line in [Text(LEGEND, style="dim"), *remarks(iterates, curves)]:
         out.print(line, soft_wrap=not out.is_terminal)
@@ -60,11 +64,7 @@ def _series(name: str, mark: str, rows: Sequence[Row], column: str, style: str =
 
 def table(iterates: Sequence[Row]) -> Table:
     """One line an iterate."""
-    first = iterates[0]
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold", title_justify="left")
-    steps = f", {first['newton']} Newton steps" if first["newton"] else ""
-    out.title = Text(f"{tables.named('problem', first)}, unrolled-ad[inner={first['inner']}]{steps}", style="bold")
-    out.title_style = ""
+    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     thinned = any(row["checkpoint"] for row in iterates)
     names = (["checkpoint"] if thinned else []) + ["k", "J", "g", "residual", "tape", "products", "time"]
     for name in names:
