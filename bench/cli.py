@@ -28,6 +28,8 @@ from bench.commands.shared import (
     solver_of,
     store_option,
 )
+from bench.commands.tolerance import tolerance
+from bench.commands.unrolling import unrolling
 from bench.commands.vcurve import vcurve
 from problems.errors import DomainError, InputError
 
@@ -266,3 +268,7 @@ def report(store: Path) -> None:
     from bench.store import Store
 
     show(Store(store).rows())
+
+
+main.add_command(tolerance)
+main.add_command(unrolling)

@@ -57,4 +57,69 @@ POINTS = (
     Column("scale", "REAL", "problem's", "what errors are relative to: the component's own slope, or |g w|"),
 )
 
-STUDIES: dict[str, tuple[Column, ...]] = {"checks": CHECKS, "points": POINTS}
+PROBLEM = (
+    Column("problem", "TEXT", "", "name of the problem"),
+    Column("problem_options", "TEXT", "", "its options, defaults included", json=True),
+    Column("at", "TEXT", "", "the p it was studied at: start, true or a file"),
+    Column("n_state", "INTEGER", "1", "n_u, free unknowns"),
+    Column("n_param", "INTEGER", "1", "n_p, parameters"),
+)
+JUDGED = (
+    Column("status", "TEXT", "", "ok, skipped or failed"),
+    Column("reason", "TEXT", "", "why it was skipped or failed"),
+    Column("objective", "REAL", "problem's", "J"),
+    Column("objective_error", "REAL", "1", "|J - J_ref| / |J_ref|, J_ref solved for directly to 1e-13"),
+    Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2, where judged in directions V: of V^T g"),
+    Column("reference", "TEXT", "", "where g_ref comes from"),
+    Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved"),
+)
+
+TOLERANCE = (
+    *PROBLEM,
+    Column("linear_solver", "TEXT", "", "of the forward and the linearized solves"),
+    Column("sweep", "TEXT", "", "which tolerance was varied: forward, adjoint or both"),
+    Column("route", "TEXT", "", "name of the route"),
+    Column("route_options", "TEXT", "", "its options, as resolved at this tolerance", json=True),
+    Column("rtol", "REAL", "1", "tolerance of forward solves; NULL where the route was skipped as a whole"),
+    Column("adjoint_rtol", "REAL", "1", "tolerance of linearized and adjoint solves"),
+    *JUDGED,
+    Column("adjoint_residual", "REAL", "1", "|R_u^T lam + J_u|_inf / |J_u|_inf, of routes that give lam"),
+)
+
+INNER = Column("inner", "TEXT", "", "the iteration of unrolled-ad: cg, richardson, jacobi or direct")
+CHECKPOINT = Column("checkpoint", "INTEGER", "1", "every so-manieth iterate kept on the tape; NULL: all")
+UNROLLING = (
+    *PROBLEM,
+    INNER,
+    CHECKPOINT,
+    Column("iterations", "INTEGER", "1", "k, of each Newton step; direct: Newton steps"),
+    Column("newton", "INTEGER", "1", "Newton steps around them; NULL on linear problems and for direct"),
+    *JUDGED,
+    Column("tape_bytes", "INTEGER", "byte", "arrays AD holds between its forward and its backward sweep"),
+    Column("products", "INTEGER", "1", "products with R_u or R_u^T, both sweeps"),
+    Column("seconds", "REAL", "s", "one gradient, median of up to 3 steady calls"),
+)
+UNROLLING_FITS = (
+    *PROBLEM,
+    INNER,
+    CHECKPOINT,
+    Column("implicit_error", "REAL", "1", "gradient_error of implicit-ad"),
+    Column("enough", "REAL", "1", "gradient_error at which unrolled-ad has met it, at least 1e3 eps"),
+    Column("meets", "INTEGER", "1", "the least k found with at most that error"),
+    Column("points", "INTEGER", "1", "tapes fitted"),
+    Column("bytes_per_iteration", "REAL", "byte", "slope of tape_bytes over iterations x newton, least squares"),
+    Column("fixed_bytes", "REAL", "byte", "tape_bytes of that line at no iterations"),
+    Column("fit_residual", "REAL", "1", "largest distance of a tape from the line, relative to the largest tape"),
+    Column("compared_at", "INTEGER", "1", "k at which checkpoints are compared with none"),
+    Column("tape_ratio", "REAL", "1", "tape_bytes with them / without"),
+    Column("products_ratio", "REAL", "1", "products with them / without"),
+    Column("time_ratio", "REAL", "1", "seconds with them / without, in the same rounds"),
+)
+
+STUDIES: dict[str, tuple[Column, ...]] = {
+    "checks": CHECKS,
+    "points": POINTS,
+    "tolerance": TOLERANCE,
+    "unrolling": UNROLLING,
+    "unrolling_fits": UNROLLING_FITS,
+}

@@ -6,6 +6,7 @@ import importlib.util
 import warnings
 import weakref
 from collections.abc import Callable
+from copy import copy
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from problems.errors import InputError, SingularMatrix
 from problems.problem import Array
 from problems.sparse import BlockDiagonal, GeneralSparse, SymmetricSparse
 from routes.chain_factorization import BorderedFactorization, ChainFactorization
+from routes.iterative import IterativeFactorization, Kind
 from routes.pardiso import (
     COMPLEX_GENERAL,
     COMPLEX_SYMMETRIC,
@@ -27,7 +29,7 @@ from routes.pardiso import (
     solution_error,
 )
 
-LinearSolver = Literal["auto", "pardiso", "superlu", "cg-amg"]
+LinearSolver = Literal["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
 
 
 class Factorization(Protocol):
@@ -51,28 +53,33 @@ class Factorization(Protocol):
 class Factorizer:
     """Makes factorizations; sparse ones by MKL PARDISO where it is installed, else by SuperLU, or by multigrid.
 
-    A pattern is analyzed once: factors that nobody holds any more leave their analysis to the next ones.
+    A pattern is analyzed once: factors that nobody holds any more leave their analysis to the next ones. krylov and
+    descent factorize nothing: they iterate, on matrices of every type, until `rtol` is met.
     """
 
-    def __init__(self, linear_solver: LinearSolver = "auto") -> None:
+    def __init__(self, linear_solver: LinearSolver = "auto", rtol: float = 1e-12) -> None:
         have_pardiso = importlib.util.find_spec("pymklpardiso") is not None
         if linear_solver == "pardiso" and not have_pardiso:
             raise InputError("linear solver pardiso: py-mkl-pardiso is not installed - pip install it or take superlu")
         self.pardiso = have_pardiso and linear_solver != "superlu"
         self.multigrid = linear_solver == "cg-amg"
+        self.iterative: Kind | None = linear_solver if linear_solver in ("krylov", "descent") else None
+        self.rtol = rtol
         self._idle: weakref.WeakKeyDictionary[Any, Idle] = weakref.WeakKeyDictionary()
 
     def __call__(self, A: Any, who: str) -> Factorization:
         """Factorize A: a Chain, Bordered or not, a SymmetricSparse or GeneralSparse, BlockDiagonal of such, a dense
         array or a SciPy sparse matrix. Raises SingularMatrix, and InputError for what cg-amg cannot solve."""
+        if isinstance(A, BlockDiagonal):
+            return BlockFactorization(A, lambda block: self(block, who))
+        if self.iterative is not None:
+            return IterativeFactorization(A, who, self.iterative, self.rtol)
         if isinstance(A, Chain):
             return ChainFactorization(A, who)
         if isinstance(A, Bordered):
             return BorderedFactorization(A, who)
         if isinstance(A, np.ndarray):
             return DenseFactorization(A, who)
-        if isinstance(A, BlockDiagonal):
-            return BlockFactorization(A, lambda block: self(block, who))
         if self.multigrid:
             return self._by_multigrid(A, who)
         if not isinstance(A, SymmetricSparse | GeneralSparse):
@@ -97,6 +104,13 @@ class Factorizer:
             return PardisoFactorization(A, who, POSITIVE_DEFINITE, idle)
         except SingularMatrix:  # not positive definite: a buckled state, say
             return PardisoFactorization(A, who, SYMMETRIC, idle)
+
+
+def to_tolerance(factors: Factorization, rtol: float) -> Factorization:
+    """The same factors; those that iterate end at rtol |b|_inf."""
+    if isinstance(factors, IterativeFactorization):
+        return factors.to(rtol)
+    return factors.to(rtol) if isinstance(factors, BlockFactorization) else factors
 
 
 class DenseFactorization:
@@ -163,6 +177,12 @@ class BlockFactorization:
         self.blocks = tuple(factorize(block) for block in A.blocks)
         self.name = " + ".join(dict.fromkeys(block.name for block in self.blocks))
         self.norm = max(block.norm for block in self.blocks)
+
+    def to(self, rtol: float) -> BlockFactorization:
+        """See to_tolerance."""
+        other = copy(self)
+        other.blocks = tuple(to_tolerance(block, rtol) for block in self.blocks)
+        return other
 
     @property
     def nbytes(self) -> int:

@@ -23,7 +23,7 @@ class Model:
         self.problem = problem
         self.solver = solver or Solver()
         self.tally = tally or Tally()
-        self._factorize = Factorizer(self.solver.linear_solver)
+        self._factorize = Factorizer(self.solver.linear_solver, self.solver.rtol)
 
     @property
     def parameters(self) -> Parameters:

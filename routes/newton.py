@@ -28,16 +28,19 @@ Newton = Literal["full", "inexact"]
 class Solver:
     """When a forward solve is done: |R|_inf <= rtol |R(u_0)|_inf, or R is rounding; at most max_steps steps.
 
-    linear_solver  of sparse systems: pardiso, superlu, cg-amg, or the best direct one that is installed
+    linear_solver  of sparse systems: pardiso, superlu, cg-amg, or the best direct one that is installed; of all:
+                   krylov and descent, iterations that end at the tolerance
     newton         full: R_u is factorized at every step; inexact: once, and again where that pays. A linear problem
                    takes one full step, complex p full ones: the imaginary part is not watched; and so do problems
                    without line search: that full steps converge is known of exact ones
+    adjoint_rtol   |b - R_u x|_inf / |b|_inf of linearized solves, transposed or not, where they iterate
     """
 
     rtol: float = 1e-12
     max_steps: int = 50
     linear_solver: LinearSolver = "auto"
     newton: Newton = "full"
+    adjoint_rtol: float = 1e-12
 
 
 @dataclass(frozen=True)

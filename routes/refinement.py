@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.errors import NotConverged
 from problems.problem import Array
-from routes.factorization import Factorization
+from routes.factorization import Factorization, to_tolerance
 from routes.krylov import conjugate_gradients, conjugate_residuals, products_to
 from routes.model import Model
 from routes.newton import State, norm
@@ -20,7 +20,6 @@ Factors = Annotated[
     Literal["refined", "fresh", "stale"],
     "the last Newton factors corrected with R_u at u; new ones at u; the last ones as they are",
 ]
-RTOL = 1e-12  # |b - R_u x|_inf / |b|_inf of a refined solve
 SAFETY = 10.0  # on the contraction seen, before it is trusted once more
 WORTH = 15  # products, each with a substitution, that cost what an assembly and a factorization cost
 
@@ -31,17 +30,19 @@ class LinearizedSolver:
     The last Newton factors belong to the iterate before: used as they are (`stale`), the gradient is off by the
     size of the last step. `refined` corrects with them by Krylov iterations on products with R_u; where those would
     take longer than new factors, as after inexact steps, and for `fresh`, R_u is factorized at u. A linear problem's
-    factors fit.
+    factors fit. Solves that iterate end at the solver's adjoint_rtol; a solver that factorizes nothing takes R_u at u.
     """
 
     def __init__(self, model: Model, state: State, factors: str, solves: int = 1) -> None:
         self.model, self.state = model, state
-        self.A, self.R_u = state.factors, None
+        self.rtol = model.solver.adjoint_rtol
+        self.A, self.R_u = to_tolerance(state.factors, self.rtol), None
         if model.problem.linear or factors == "stale":
             return
         known = state.rate is not None and math.isfinite(state.rate)
-        if factors == "fresh" or (known and solves * products_to(state.rate or 0.0, 1.0, RTOL) > WORTH):
-            self.A = model.factors_at(state)
+        too_far = known and solves * products_to(state.rate or 0.0, 1.0, self.rtol) > WORTH
+        if factors == "fresh" or too_far or model.solver.linear_solver in ("krylov", "descent"):
+            self.A = to_tolerance(model.factors_at(state), self.rtol)
         else:
             self.R_u = model.tangent_operator(state)
 
@@ -62,7 +63,7 @@ class LinearizedSolver:
             lambda v: self.model.matvec(R_u, v),
             lambda r: substitute(self.A, r),
             b,
-            RTOL / SAFETY * norm(b),
+            self.rtol / SAFETY * norm(b),
             at_most=WORTH,
         )
         if done.converged:

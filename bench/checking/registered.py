@@ -20,6 +20,7 @@ from routes.route import Options, Result, Route
 from routes.twin import with_synthetic_data
 
 LARGEST = 30_000  # unknowns of a finer mesh: some tens of forward solves there take a minute
+LEAST_RTOL = 1e-15  # below, residuals are rounding
 TIGHT = Solver(rtol=1e-14)  # of complex steps: a judge is no fellow of the judged
 
 
@@ -62,7 +63,11 @@ def _counted(model: Model) -> Callable[[Array], float]:
 
 
 def _tighter(solver: Solver, factor: float) -> Solver:
-    return replace(solver, rtol=solver.rtol * factor)
+    def tight(rtol: float, least: float) -> float:
+        return max(min(rtol, least), rtol * factor)
+
+    adjoint_rtol = tight(solver.adjoint_rtol, Solver.adjoint_rtol)
+    return replace(solver, rtol=tight(solver.rtol, LEAST_RTOL), adjoint_rtol=adjoint_rtol)
 
 
 def _more(options: Options) -> Options:

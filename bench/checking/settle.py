@@ -37,7 +37,7 @@ def tighten(seen: Examination, reading: Reading) -> Iterator[Tightened]:
     """The line of `reading` once more with a tighter forward solve, and a tighter one until what stood there falls."""
     for factor in FACTORS:
         again = _again(seen, reading, factor)
-        if again is None:
+        if again is None or again.reading.says == "nothing":  # a solver that cannot be tightened says nothing
             return
         yield again
         if fell(reading, again.reading):

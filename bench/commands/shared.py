@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 STORE = Path("results") / "routes.sqlite"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
-LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg"]
+LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
+ITERATIVE = "krylov and descent iterate, on systems of any kind, until --rtol is met."
 NEWTON = "Factors at every Newton step, or kept and iterated with."
 
 store_option = click.option(
@@ -33,7 +34,7 @@ max_steps_option = click.option(
     "--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most."
 )
 linear_solver_option = click.option(
-    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True
+    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True, help=ITERATIVE
 )
 newton_option = click.option(
     "--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON

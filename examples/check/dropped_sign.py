@@ -17,7 +17,7 @@ def stiffness(a):
 
 class Poisson:
     start = np.linspace(1.0, 2.0, n)
-    names = [f"a_{e + 1}" for e in range(n)]
+    names = tuple(f"a_{e + 1}" for e in range(n))
     bounds = (1e-6, np.inf)
 
     def objective(self, a):

@@ -9,7 +9,7 @@ PROGRAM = [sys.executable, str(Path(__file__).parent / "executable_solver.py")]
 
 
 class External:
-    start = [0.5, 1.5]
+    start = (0.5, 1.5)
     bounds = (0.1, 10.0)
 
     def __init__(self, tolerance=1e-12):

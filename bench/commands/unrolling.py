@@ -1,0 +1,68 @@
+"""`routes unrolling`: error and tape of unrolled AD against the number of iterations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from bench.commands.shared import at_option, debug_option, no_store_option, store_option
+from bench.commands.studying import (
+    budget_option,
+    checked,
+    echo_json,
+    json_option,
+    keep,
+    no_plot_option,
+    now,
+    one_problem,
+    problem_option,
+    writable,
+)
+
+INNER = "The iteration on the tape. [that of the route]"
+CHECKPOINT = "Beside that, keep every so-manieth iterate only."
+WITHIN = "Errors of implicit-ad that the gradient may have to have met it."
+
+
+@click.command()
+@problem_option
+@at_option
+@click.option("--inner", type=click.Choice(["cg", "richardson", "jacobi", "direct"]), help=INNER)
+@click.option("--checkpoint", type=int, metavar="C", help=CHECKPOINT)
+@click.option("--max-iterations", type=int, default=4096, show_default=True, help="Where k ends.")
+@click.option("--within", type=float, default=10.0, show_default=True, help=WITHIN)
+@budget_option
+@no_plot_option
+@json_option
+@store_option
+@no_store_option
+@debug_option
+def unrolling(
+    selector: str,
+    at: str,
+    inner: str | None,
+    checkpoint: int | None,
+    max_iterations: int,
+    within: float,
+    budget: float,
+    no_plot: bool,
+    as_json: bool,
+    store: Path,
+    no_store: bool,
+) -> None:
+    """What unrolled AD takes to be right: errors of J and its gradient, and bytes of tape, against k iterations.
+
+    k doubles until the gradient meets that of implicit-ad; the tape is fitted by a line. Errors of 2e-13 are rounding.
+    """
+    from bench.studies import unrolling as study
+    from bench.views import unrolling as view
+
+    problem = one_problem(selector)
+    kept, started = writable(store, no_store), now()
+    done = study.unrolling(problem, at, inner, checkpoint, max_iterations, within, checked(budget))
+    if as_json:
+        echo_json(done.tables)
+    else:
+        view.show(done.tables["unrolling"], done.tables["unrolling_fits"], plotted=not no_plot)
+    keep(kept, done.tables, started, quiet=as_json)

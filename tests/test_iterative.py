@@ -1,0 +1,116 @@
+"""Solvers that end at a tolerance: |b - A x| <= rtol |b| on every kind of matrix, no further than asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import relative_error
+from scipy.sparse import csr_array
+from test_factorization import BLOCK, PATTERN, START, entries
+
+from problems.bar import Bar
+from problems.block import Block
+from problems.chain import Chain
+from problems.errors import NotConverged
+from problems.sparse import BlockDiagonal
+from routes.adjoint import adjoint
+from routes.complex_step import complex_step
+from routes.factorization import Factorizer, to_tolerance
+from routes.iterative import ROUNDING
+from routes.model import Model
+from routes.newton import Solver
+from routes.refinement import LinearizedSolver
+from routes.tally import Work
+from routes.tangent import tangent
+
+RNG = np.random.default_rng(5)
+ROUGH = np.exp(RNG.standard_normal(40))
+K = BLOCK.tangent(np.zeros(BLOCK.n_state), START)
+GENERAL = PATTERN.assemble(entries(float))
+MATRICES = {
+    "chain": Chain(ROUGH[:16]),
+    "symmetric": K,
+    "dense": np.diag(ROUGH) + 0.1,
+    "dense, general": np.diag(ROUGH) + 0.01 * RNG.standard_normal((40, 40)),
+    "indefinite": np.diag(np.where(np.arange(40) % 3, ROUGH, -ROUGH)),
+    "general": GENERAL,
+    "scipy": csr_array(np.diag(ROUGH) + 0.1 * np.eye(40, k=1)),
+    "blocks": BlockDiagonal((K, K)),
+    "complex": np.diag(ROUGH * (1 + 0.1j)) + 0.1,
+}
+WANT_DEFINITE = {"general", "indefinite"}  # what minimal residuals cannot do
+PAIRS = [("krylov", kind) for kind in MATRICES] + [("descent", kind) for kind in MATRICES if kind not in WANT_DEFINITE]
+
+
+@pytest.mark.parametrize("rtol", [1e-1, 1e-4, 1e-11])
+@pytest.mark.parametrize(("linear_solver", "kind"), PAIRS)
+def test_they_end_at_the_tolerance(linear_solver, kind: str, rtol: float) -> None:
+    A = MATRICES[kind]
+    factors = Factorizer(linear_solver, rtol)(A, "test")
+    b = np.random.default_rng(7).standard_normal(16 if kind == "chain" else A.shape[0])
+    for left in (b - A @ factors.solve(b), b - A.T @ factors.solve_transposed(b)):
+        assert abs(left).max() <= rtol * abs(b).max()
+        if kind != "chain" and rtol > 1e-6:  # conjugate gradients jump there; GMRES near its last direction
+            assert abs(left).max() > 1e-3 * rtol * abs(b).max(), "solved further than asked"
+    tight = to_tolerance(factors, 1e-12)
+    x = tight.solve(b)
+    assert abs(b - A @ x).max() <= max(1e-12 * abs(b).max(), ROUNDING * factors.norm * abs(x).max())
+    assert to_tolerance(tight, rtol).solve(b).tobytes() == factors.solve(b).tobytes()
+    assert not factors.solve(0.0 * b).any()
+    assert factors.nbytes > 0 < factors.norm
+
+
+def test_what_stalls_says_how_far_it_came() -> None:
+    singular = np.diag([1.0, 1.0, 0.0])
+    with pytest.raises(
+        NotConverged, match=r"test: conjugate gradients: \|b - A x\| = .* - loosen the tolerance or take"
+    ):
+        Factorizer("krylov")(singular, "test").solve(np.ones(3))
+    with pytest.raises(NotConverged, match=r"test: minimal residuals: "):
+        Factorizer("descent")(np.array([[0.0, 1.0], [-1.0, 0.0]]), "test").solve(np.ones(2))
+
+
+@pytest.mark.parametrize("linear_solver", ["krylov", "descent"])
+@pytest.mark.parametrize("n", [5, 8])
+def test_the_bar_is_solved_as_by_sums(linear_solver, n: int) -> None:
+    bar = Bar(n=n, noise=0.01)
+    truth, reference = bar.truth(), bar.reference(bar.truth())
+    for route in (adjoint, tangent, complex_step):
+        model = Model(bar, Solver(linear_solver=linear_solver))
+        result = route.prepare(model, truth)(truth)
+        assert relative_error(result.gradient, reference.gradient) < 1e-8  # cond(K) rtol = 3e3 * 1e-12 at most, twice
+
+
+def test_linearized_solves_have_a_tolerance_of_their_own() -> None:
+    """On the linear problem by the forward solve's own matrix, on a nonlinear one by that at u."""
+    for problem in (Block(n=2, law="linear"), Block(n=2)):
+        p = problem.parameters.start
+        model = Model(problem, Solver(linear_solver="krylov", adjoint_rtol=1e-3))
+        state = model.solve(p)
+        R_u, b = problem.tangent(state.u, p), np.random.default_rng(1).standard_normal(problem.n_state)
+        for factors in ("refined", "fresh"):
+            linearized = LinearizedSolver(model, state, factors)
+            for x in (linearized.solve(b), linearized.solve_transposed(b)):
+                assert 1e-7 < abs(b - R_u @ x).max() / abs(b).max() <= 1e-3
+        assert state.residual <= 1e-12
+
+
+def test_refined_solves_end_at_the_tolerance_too() -> None:
+    """With factors of the iterate before: a looser tolerance takes fewer products."""
+    block, products = Block(n=2), []
+    for adjoint_rtol in (1e-2, 1e-12):
+        model = Model(block, Solver(rtol=1e-4, adjoint_rtol=adjoint_rtol))
+        adjoint.prepare(model, block.parameters.start)(block.parameters.start)
+        products.append(model.tally.work.matvecs)
+    assert products[0] < products[1]
+
+
+@pytest.mark.parametrize("problem", ["bar", "block[n=2]", "block[nx=1,ny=1,nz=2,load=follower,cases=2]"])
+def test_bills_are_as_declared(cli, problem: str) -> None:
+    ran = cli("run", "--json", "--no-store", "--min-time", "0", "--problem", problem, "--route", "all",
+              "--linear-solver", "krylov")  # fmt: skip
+    for row in ran.rows:
+        assert row["status"] == "ok", row["reason"]
+        assert Work(**row["work"]) == Work(**row["predicted_work"]), row["route"]
+        assert row["gradient_error"] < 1e-6
+        assert row["linear_solver"].startswith(("conjugate", "GMRES"))

@@ -1,0 +1,159 @@
+"""Loose solves: how far gradients are off, by which tolerance, and what the command says of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench import case
+from bench.store import Store
+from bench.studies.tolerance import Sweep, Tolerance, decades, default_solver, tolerance
+from bench.study_rows import TOLERANCE
+from bench.views.tolerance import remarks
+from problems.bar import Bar
+from problems.block import Block
+
+ROUGH = "bar[n=24,sensors=24,noise=0.01]"  # at its true moduli conjugate gradients take many steps, not n
+
+
+def study(problem: str, *routes: str, sweep: Sweep | None = None, **options) -> Tolerance:
+    (spec,) = case.problems([problem])
+    return tolerance(spec, case.routes(routes), sweep or Sweep(decades(1e-1, 1e-13)), **options)
+
+
+def column(done: Tolerance, name: str, route: str = "adjoint") -> np.ndarray:
+    return np.array([row[name] for row in done.rows if row["route"] == route], dtype=float)
+
+
+@pytest.mark.parametrize(("problem", "at", "linear_solver"), [("bar", "start", "descent"), (ROUGH, "true", "krylov")])
+def test_the_adjoints_error_falls_with_the_tolerance_and_is_not_the_residual(
+    problem: str, at: str, linear_solver
+) -> None:
+    done = study(problem, "adjoint", at=at, linear_solver=linear_solver)
+    error, residual, rtol = (column(done, name) for name in ("gradient_error", "residual", "rtol"))
+    assert (residual <= rtol).all()
+    assert (column(done, "adjoint_residual") <= 2 * rtol).all()  # 2: the last is rounding
+    assert error[0] > 1e-3 > 1e-9 > error[-1]
+    assert (error[1:] <= 3 * error[:-1]).all()  # 3: not every iterate is better than the one before
+    ratio = error / residual
+    assert ratio.max() > 10, "the residual is no bound of the error: cond(K) stands between"
+
+
+def test_routes_are_wrong_in_their_own_ways() -> None:
+    done = study("bar", "adjoint", "implicit-ad", "complex-step", "fd-central", "unrolled-ad", linear_solver=None)
+    assert done.linear_solver == "descent"
+    errors = {route: column(done, "gradient_error", route) for route in ("adjoint", "implicit-ad", "complex-step")}
+    np.testing.assert_allclose(errors["adjoint"], errors["implicit-ad"], rtol=1e-3)
+    loose = slice(0, 6)
+    np.testing.assert_allclose(
+        column(done, "gradient_error", "fd-central")[loose], errors["complex-step"][loose], rtol=1e-2
+    )  # both differentiate the iterate
+    assert column(done, "gradient_error", "fd-central").min() > 10 * errors["complex-step"].min()  # noise / h
+    k = [row["route_options"]["iterations"] for row in done.rows if row["route"] == "unrolled-ad"]
+    assert {row["route_options"]["inner"] for row in done.rows if row["route"] == "unrolled-ad"} == {"richardson"}
+    assert k == sorted(k)
+    assert k[0] < k[-1] / 10
+
+
+@pytest.mark.parametrize("problem", ["bar", "block[n=2,law=linear]"])
+def test_the_adjoint_tolerance_alone_spoils_the_gradient_and_not_J(problem: str) -> None:
+    done = study(problem, "adjoint", "tangent", sweep=Sweep((1e-2, 1e-5), forward=1e-13))
+    for route in ("adjoint", "tangent"):
+        assert (column(done, "objective_error", route) < 1e-9).all()
+        error = column(done, "gradient_error", route)
+        assert error[0] > 1e-4
+        assert error[0] > 10 * error[1]
+    both = study(problem, "adjoint", sweep=Sweep((1e-2, 1e-5), adjoint=1e-13))
+    assert (column(both, "adjoint_residual") < 1e-12).all()
+    assert column(both, "objective_error")[0] > 1e-4
+
+
+def test_nonlinear_problems_are_solved_as_ever() -> None:
+    assert (default_solver(Block(n=2)), default_solver(Bar(n=33)), default_solver(Bar())) == (
+        "auto",
+        "krylov",
+        "descent",
+    )
+    done = study("block[n=2]", "adjoint", sweep=Sweep((1e-1, 1e-12)))
+    assert column(done, "gradient_error")[0] > 1e-3 > 1e-9 > column(done, "gradient_error")[1]
+
+
+def test_what_cannot_run_or_fails_is_a_row_with_its_reason() -> None:
+    done = study("block[n=2]", "unrolled-ad[inner=jacobi]", "adjoint", sweep=Sweep((1e-12,)), linear_solver="descent")
+    skipped, failed = done.rows
+    assert (skipped["status"], skipped["rtol"]) == ("skipped", None)
+    assert "iterates on linear problems" in skipped["reason"]
+    assert failed["status"] in ("ok", "failed")
+    dear = study("bar", "fd-central", sweep=Sweep((1e-3,)), budget=1e-9)
+    assert dear.rows[0]["status"] == "skipped"
+    assert "--budget inf" in dear.rows[0]["reason"]
+    singular = study("bar", "adjoint", "fd-central[step=1e3]", sweep=Sweep((1e-2, 1e-3)))
+    assert [row["status"] for row in singular.rows] == ["ok", "ok", "failed", "failed"]
+    (line,) = remarks(singular.rows)
+    assert line.plain.startswith("failed at 0.01, 0.001: fd-central")
+
+
+def test_the_command_prints_rows_and_keeps_them(cli) -> None:
+    arguments = ("tolerance", "--problem", "bar", "--route", "adjoint", "--route", "fd-central", "--tightest", "1e-3")
+    ran = cli(*arguments, "--json")
+    assert (ran.code, ran.err) == (0, "")
+    assert len(ran.rows) == 2 * 3
+    for row in ran.rows:
+        assert list(row) == ["table", *sorted_as(row)]
+        assert row["table"] == "tolerance"
+        assert row["status"] == "ok"
+        assert row["gradient_error"] > 0 < row["residual"] <= row["rtol"] == row["adjoint_rtol"]
+    names, kept = Store(Path("results/routes.sqlite")).table("tolerance")
+    assert names == ["study_id", *(c.name for c in TOLERANCE)]
+    assert [record[names.index("gradient_error")] for record in kept] == [row["gradient_error"] for row in ran.rows]
+    exported = json.loads(cli("export", "--table", "tolerance", "--format", "json").out)
+    assert len(exported) == 6
+
+
+def sorted_as(row: dict) -> list[str]:
+    """The columns of the table, in the order of the row: none is missing, none is too many."""
+    assert {c.name for c in TOLERANCE} == row.keys() - {"table"}
+    return [name for name in row if name != "table"]
+
+
+def test_the_screen_shows_a_plot_and_residuals_beside_errors(cli) -> None:
+    ran = cli(
+        "tolerance", "--problem", "bar", "--route", "adjoint", "--no-store", "--loosest", "1e-2", "--tightest", "1e-4"
+    )
+    assert ran.code == 0
+    assert "bar: |g - g_ref| / |g_ref|" in ran.out
+    assert "A adjoint" in ran.out
+    table = ran.out[ran.out.index("tolerance residual") :].splitlines()
+    assert [line.split()[0] for line in table[1:5]] == ["0.01", "0.001", "0.0001", "floor"]
+    only = cli(
+        "tolerance", "--problem", "bar", "--route", "adjoint", "--no-store", "--tightest", "1e-2", "--no-plot"
+    ).out
+    assert "A adjoint" not in only
+    assert "note:" not in only
+    direct = ("--linear-solver", "auto", "--no-plot", "--tightest", "1e-2", "--no-store")
+    assert "note: forward solves are exact" in cli("tolerance", "--problem", "bar", "--route", "adjoint", *direct).out
+
+
+WRONG = {
+    "--route adjiont": "did you mean 'adjoint'?",
+    "--loosest 2": "give 1 > loosest >= tightest > 0",
+    "--loosest 1e-9 --tightest 1e-3": "give 1 > loosest >= tightest > 0",
+    "--tightest 0": "give 1 > loosest >= tightest > 0",
+    "--per-decade 0": "at least 1",
+    "--rtol 1e-9": "add --sweep adjoint",
+    "--sweep both --adjoint-rtol 1e-9": "take --sweep forward",
+    "--adjoint-rtol 3": "between 0 and 1",
+    "--budget 0": "--budget",
+    "--problem bar[n=8|9]": "names 2 problems",
+    "--linear-solver gauss": "'gauss'",
+}
+
+
+@pytest.mark.parametrize("arguments", WRONG)
+def test_wrong_usage_is_one_line(cli, arguments: str) -> None:
+    ran = cli("tolerance", "--problem", "bar", "--no-store", *arguments.split())
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert WRONG[arguments] in ran.err
