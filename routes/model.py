@@ -91,7 +91,7 @@ class Model:
         are taken after convergence, on nonlinear problems. p may be complex where the problem offers COMPLEX.
         Raises NotConverged, SingularMatrix.
         """
-        polish = 0 if self.problem.linear else polish
+        polish = 0 if self.problem.linear else max(polish, self.solver.polish)
         before = self.tally.work
         self.tally.count("forward_solves")
         u = self.problem.initial(p) if start is None else start.u.astype(p.dtype)

@@ -34,6 +34,7 @@ class Solver:
                    takes one full step, complex p full ones: the imaginary part is not watched; and so do problems
                    without line search: that full steps converge is known of exact ones
     adjoint_rtol   |b - R_u x|_inf / |b|_inf of linearized solves, transposed or not, where they iterate
+    polish         Newton steps after convergence, on nonlinear problems
     """
 
     rtol: float = 1e-12
@@ -41,6 +42,7 @@ class Solver:
     linear_solver: LinearSolver = "auto"
     newton: Newton = "full"
     adjoint_rtol: float = 1e-12
+    polish: int = 0
 
 
 @dataclass(frozen=True)

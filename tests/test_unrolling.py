@@ -103,7 +103,7 @@ WRONG = {
     "--inner newton": "'newton'",
     "--inner direct --checkpoint 4": "inner=direct",
     "--problem block --inner jacobi": "is nonlinear - take inner=cg",
-    "--problem all": "names 2 problems",
+    "--problem all": "names 3 problems",
 }
 
 

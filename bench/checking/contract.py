@@ -67,8 +67,8 @@ def _of_problem(problem: Problem, p: Array, routes: Sequence[Route], solver: Sol
 
 
 def _claim(name: str, holds: Any, otherwise: str = "") -> Finding:
-    """A yes or no, as 0 or 1."""
-    return Finding(name, 0.0 if holds else 1.0, 0.5, "" if holds else otherwise, None if holds else name)
+    said, culprit = ("", None) if holds else (otherwise, name)
+    return Finding(name, 0.0 if holds else 1.0, 0.5, said, culprit, claim=True)
 
 
 def _parameters(problem: Problem) -> Iterator[Finding]:

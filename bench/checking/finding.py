@@ -12,6 +12,7 @@ class Finding:
 
     Both are relative errors where nothing else is said.
     says     in words, where there is something to say
+    claim    a yes or no: value is 0 where it holds, else 1
     culprit  the factor it convicts, where it does; by_mesh: unless that shrinks with the mesh size
     """
 
@@ -21,6 +22,7 @@ class Finding:
     says: str = ""
     culprit: str | None = None
     by_mesh: bool = False
+    claim: bool = False
 
     @property
     def sound(self) -> bool | None:

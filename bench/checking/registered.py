@@ -63,11 +63,13 @@ def _counted(model: Model) -> Callable[[Array], float]:
 
 
 def _tighter(solver: Solver, factor: float) -> Solver:
+    """Tolerances times the factor, and a Newton step more: where steps square |R|, a tolerance may change nothing."""
+
     def tight(rtol: float, least: float) -> float:
         return max(min(rtol, least), rtol * factor)
 
     adjoint_rtol = tight(solver.adjoint_rtol, Solver.adjoint_rtol)
-    return replace(solver, rtol=tight(solver.rtol, LEAST_RTOL), adjoint_rtol=adjoint_rtol)
+    return replace(solver, rtol=tight(solver.rtol, LEAST_RTOL), adjoint_rtol=adjoint_rtol, polish=1)
 
 
 def _more(options: Options) -> Options:

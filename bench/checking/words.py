@@ -87,8 +87,8 @@ def on_plateau(check: Check, verdict: Verdict) -> Check:
         return replace(check, verdict=verdict, says=says, todo=_tighten_for_good(check))
     if verdict == "inconsistent-discretization":
         assert check.refined is not None
-        says += f"; on a mesh of half the size {check.refined.after:.2g}, before {check.refined.before:.2g}"
-        says += f": it shrinks like h^{check.refined.order:.1f}"
+        says += f"; along smooth fields {check.refined.before:.2g}, and {check.refined.after:.2g} on a mesh of half the"
+        says += f" size: it shrinks like h^{check.refined.order:.1f}"
         todo = "differentiate what is computed: discretize first, then optimize"
         return replace(check, verdict=verdict, says=says, todo=todo, culprit="an adjoint discretized on its own")
     if check.tightened:

@@ -20,7 +20,8 @@ from bench.commands.shared import (
     solver_of,
     store_option,
 )
-from bench.commands.verdict import built, conclude, now, one_problem, one_route, writable
+from bench.commands.studying import no_plot_option, now, one_problem
+from bench.commands.verdict import built, conclude, one_route, writable
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too 
 @click.option("--seed", type=int, default=0, show_default=True, help="Of random directions.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
 @click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
+@no_plot_option
 @store_option
 @no_store_option
 @debug_option
@@ -66,6 +68,7 @@ def check(
     seed: int,
     as_json: bool,
     html: Path | None,
+    no_plot: bool,
     store: Path,
     no_store: bool,
 ) -> None:
@@ -99,7 +102,7 @@ def check(
     writable(html, kept)
     found = check_subject(subject, plan, accept)
     named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
-    sys.exit(conclude(found, named, as_json, html, kept, started))
+    sys.exit(conclude(found, named, started, as_json=as_json, no_plot=no_plot, html=html, store=kept))
 
 
 def _subject(

@@ -21,7 +21,7 @@ BUDGET = "Skip what is predicted to take more seconds; inf forces it."
 
 problem_option = click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM)
 budget_option = click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
-no_plot_option = click.option("--no-plot", is_flag=True, help="Only the table.")
+no_plot_option = click.option("--no-plot", is_flag=True, help="Only the tables.")
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object a row and nothing else.")
 
 

@@ -19,7 +19,8 @@ from bench.commands.shared import (
     solver_of,
     store_option,
 )
-from bench.commands.verdict import built, conclude, now, one_problem, one_route, writable
+from bench.commands.studying import no_plot_option, now, one_problem
+from bench.commands.verdict import built, conclude, one_route, writable
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ BUDGET = "Refuse what is predicted to take more seconds; inf forces it."
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the directions.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
 @click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
+@no_plot_option
 @store_option
 @no_store_option
 @debug_option
@@ -67,6 +69,7 @@ def vcurve(
     seed: int,
     as_json: bool,
     html: Path | None,
+    no_plot: bool,
     store: Path,
     no_store: bool,
 ) -> None:
@@ -93,7 +96,8 @@ def vcurve(
     _refuse_beyond(budget, seconds_of(lambda: looked_at.objective(p))[0], plan)
     writable(html, kept)
     found = check(looked_at, plan)
-    sys.exit(conclude(found, {"problem": problem, "route": route, "at": at}, as_json, html, kept, started))
+    what = {"problem": problem, "route": route, "at": at}
+    sys.exit(conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, store=kept))
 
 
 def _default(problem: Problem) -> int | tuple[int, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,16 +15,6 @@ if TYPE_CHECKING:
     from bench.case import ProblemSpec, RouteSpec
     from bench.checking.result import Check
     from problems.problem import Array, Problem
-
-
-def one_problem(selector: str) -> ProblemSpec:
-    """The one problem a selector names. Raises InputError for several."""
-    from bench import case
-
-    specs = case.problems([selector])
-    if len(specs) != 1:
-        raise InputError(f"--problem {selector}: names {len(specs)} problems - name one")
-    return specs[0]
 
 
 def one_route(selector: str) -> RouteSpec:
@@ -74,7 +63,7 @@ def keep(check: Check, what: dict[str, Any], store: Path | None, started: str) -
     return None
 
 
-def finish(check: Check, as_json: bool, html: Path | None, kept: Path | None) -> None:
+def finish(check: Check, as_json: bool, no_plot: bool, html: Path | None, kept: Path | None) -> None:
     """Print the verdict, or one JSON object; write the page."""
     from bench.rows import clean
 
@@ -85,7 +74,7 @@ def finish(check: Check, as_json: bool, html: Path | None, kept: Path | None) ->
         from bench.views.verdict import show_check
 
         out = console()
-        show_check(out, check)
+        show_check(out, check, curves=not no_plot)
         if kept is not None:
             out.print(f"kept in {kept}", style="dim", soft_wrap=True)
     if html is not None:
@@ -99,15 +88,18 @@ def finish(check: Check, as_json: bool, html: Path | None, kept: Path | None) ->
 
 
 def conclude(
-    check: Check, what: dict[str, Any], as_json: bool, html: Path | None, store: Path | None, started: str
+    check: Check,
+    what: dict[str, Any],
+    started: str,
+    *,
+    as_json: bool,
+    no_plot: bool,
+    html: Path | None,
+    store: Path | None,
 ) -> int:
     """Keep, show, and the exit code: what could not be kept is said after what was found."""
     lost = keep(check, what, store, started)
-    finish(check, as_json, html, None if lost else store)
+    finish(check, as_json, no_plot, html, None if lost else store)
     if lost is not None:
         complain(f"not kept: {lost}")
     return check.exit_code
-
-
-def now() -> str:
-    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")

@@ -150,9 +150,9 @@ def _cells(name: str, reading: Reading) -> list[str]:
 def _findings(check: Check) -> str:
     rows = []
     for f in check.findings:
-        value = "" if math.isnan(f.value) else f"{f.value:.1e}"
+        value = "" if math.isnan(f.value) else number(f.value, 2)
         mark = {True: "ok", False: "NO", None: "?"}[f.sound]
-        rows.append([f.name, mark, value, f"{f.limit:.0e}", "; ".join(filter(None, (f.says, f.culprit)))])
+        rows.append([f.name, mark, value, number(f.limit, 2), "; ".join(filter(None, (f.says, f.culprit)))])
     return _table(("test", "", "value", "limit", ""), rows)
 
 

@@ -113,12 +113,10 @@ def evidence(findings: Sequence[Finding]) -> Table:
     table.add_column("", no_wrap=True)
     table.add_column("", overflow="fold")
     for f in findings:
-        value = "" if np.isnan(f.value) else f"{f.value:.1e}"
+        value, limit = ("", "") if f.claim else ("" if np.isnan(f.value) else number(f.value, 2), number(f.limit, 2))
         style = {True: "", False: "red", None: "dim"}[f.sound]
-        said = "; ".join(filter(None, (f.says, f.culprit)))
-        table.add_row(
-            Text(f.name), value, number(f.limit, 2), Text(MARKS[f.sound], style=style), Text(said), style=style
-        )
+        said = "; ".join(filter(None, (f.says, None if f.claim else f.culprit)))
+        table.add_row(Text(f.name), value, limit, Text(MARKS[f.sound], style=style), Text(said), style=style)
     return table
 
 
