@@ -11,6 +11,7 @@ from problems.problem import Array
 ASYMPTOTIC = 0.05  # relative error above which truncation follows no power law yet
 CLEAR = 10.0  # floors above the floor, where a branch is no longer mixed with the other
 USEFUL = 1e-3  # relative error of a step that is usable
+AT_LEAST = 4  # points of a branch
 NEIGHBOURS = 3  # points whose median is the floor: one lucky step is none
 
 
@@ -54,7 +55,9 @@ def fit(h: Array, error: Array, noise: float) -> Curve:
 
 
 def slope(h: Array, error: Array, branch: Array) -> float | None:
-    """Median slope between all pairs of points at least half a decade apart (Theil 1950, Sen 1968)."""
+    """Median slope between all pairs of points at least half a decade apart (Theil 1950, Sen 1968); None of few."""
+    if np.count_nonzero(branch) < AT_LEAST:
+        return None
     x, y = np.log10(h[branch]), np.log10(error[branch])
     i, j = np.triu_indices(len(x), 1)
     apart = x[j] - x[i] >= 0.5 - 1e-9

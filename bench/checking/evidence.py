@@ -15,7 +15,6 @@ from problems.errors import RoutesError
 COUNT = 3  # random directions of complex steps
 COMPLEX = 1e-9  # relative: what complex steps and linearized solves of tolerance 1e-12 leave
 CLEAR, SMALL = 100.0, 0.1  # noises that a remainder has to exceed; steps from which powers of h are one power
-AT_LEAST = 4  # such steps
 RATE = 0.15  # of the rates 1 and 2 of Taylor remainders
 
 
@@ -36,7 +35,7 @@ def taylor(seen: Examination) -> Iterator[Finding]:
     for order, off in ((1, made.forward), (2, made.off_forward)):
         remainder = np.abs(off * made.h)
         clear = (remainder > CLEAR * reading.noise) & (made.h <= SMALL)
-        rate = slope(made.h, remainder, clear) if np.count_nonzero(clear) >= AT_LEAST else None
+        rate = slope(made.h, remainder, clear)
         name = f"Taylor remainder {'with the gradient' if order == 2 else 'without it'}"
         if rate is None:
             yield Finding(name, float("nan"), RATE, f"too few steps clear of noise to see a rate of {order}")

@@ -80,10 +80,10 @@ def vcurve(
 
     Exit code: 0 agrees, 1 wrong-gradient or inconsistent-discretization, 3 inconclusive, 2 wrong usage.
     """
+    from bench.bill import price_of
     from bench.checking.check import check
     from bench.checking.plan import Plan
     from bench.checking.registered import subject
-    from bench.timing import seconds_of
 
     if not budget > 0:
         raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
@@ -93,7 +93,7 @@ def vcurve(
     few = _default(made) if components is None else _components(components, len(p))
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     looked_at = subject(made, route_spec.route, route_spec.options, p, solver)
-    _refuse_beyond(budget, seconds_of(lambda: looked_at.objective(p))[0], plan)
+    _refuse_beyond(budget, price_of(lambda: looked_at.objective(p))[0], plan)
     writable(html, kept)
     found = check(looked_at, plan)
     what = {"problem": problem, "route": route, "at": at}
