@@ -64,9 +64,11 @@ def keep(check: Check, what: dict[str, Any], store: Path | None, started: str) -
 
 
 def finish(check: Check, as_json: bool, no_plot: bool, html: Path | None, kept: Path | None) -> None:
-    """Print the verdict, or one JSON object; write the page."""
+    """Write the page, then print the verdict, or one JSON object: a closed pipe loses no file."""
     from bench.rows import clean
 
+    if html is not None:
+        _write_page(check, html)
     if as_json:
         click.echo(json.dumps(clean(check.as_dict()), allow_nan=False))
     else:
@@ -75,16 +77,17 @@ def finish(check: Check, as_json: bool, no_plot: bool, html: Path | None, kept: 
 
         out = console()
         show_check(out, check, curves=not no_plot)
-        if kept is not None:
-            out.print(f"kept in {kept}", style="dim", soft_wrap=True)
-    if html is not None:
-        from bench.views.page import page
+        for what in ([] if kept is None else [f"kept in {kept}"]) + ([] if html is None else [f"page in {html}"]):
+            out.print(what, style="dim", soft_wrap=True)
 
-        try:
-            html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
-        except OSError as error:
-            raise InputError(f"--html {html}: {error.strerror or error} - name a file you may write") from error
-        click.echo(f"page in {html}", err=as_json)
+
+def _write_page(check: Check, html: Path) -> None:
+    from bench.views.page import page
+
+    try:
+        html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        complain(f"--html {html}: {error.strerror or error} - name a file you may write")
 
 
 def conclude(

@@ -16,13 +16,17 @@ from problems.problem import Array
 
 COLOURS = {"agrees": "#009E73", "wrong-gradient": "#D55E00", "inconsistent-discretization": "#D55E00"}
 INCONCLUSIVE = "#B8860B"
-WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 640, 360, 64, 44, 12  # [px]
+WIDTH, HEIGHT, LEFT, RIGHT, BOTTOM, TOP = 640, 360, 64, 20, 44, 12  # [px]
+TIGHTENED = ("#0072B2", "#56B4E9", "#009E73")
+SHORT = 24  # characters of a cell that is not broken
+HIGHEST = 1.0  # decades above 1 that are drawn
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222 }
 h1 { font-size: 1.4rem } h2 { font-size: 1.1rem; margin-top: 2rem }
-table { border-collapse: collapse; font-size: .9rem } th, td { padding: .2rem .7rem; text-align: left }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums } tr.no { color: #b00 }
+table { border-collapse: collapse; font-size: .9rem }
+th, td { padding: .2rem .7rem; text-align: left; vertical-align: top }
+td { font-variant-numeric: tabular-nums } td.short { white-space: nowrap } tr.no { color: #b00 }
 thead { border-bottom: 1px solid #888 } figure { margin: 1rem 0; overflow-x: auto }
 svg text { font: 12px system-ui, sans-serif } .note { color: #555; font-style: italic }
 """
@@ -54,7 +58,7 @@ def page(check: Check) -> str:
         body.append(f"<h2>Lines</h2>{_lines(check)}")
     body += [f"<figure>{svg(curves(check, r))}</figure>" for r in _drawn(check)]
     if check.findings:
-        body.append(f"<h2>Evidence without differences of J</h2>{_findings(check)}")
+        body.append(f"<h2>Second evidence</h2>{_findings(check)}")
     body += [f"<p class='note'>{escape(remark)}</p>" for remark in check.remarks]
     body.append(f"<p class='note'>{check.calls} objective calls, {check.gradients} gradient</p>")
     title = escape(f"{check.name}: {check.verdict}")
@@ -78,19 +82,21 @@ def curves(check: Check, reading: Reading) -> tuple[str, list[Curve]]:
         Curve("one-sided", made.h, np.abs(made.off_forward) / scale, "#E69F00"),
         Curve("central", made.h, np.abs(made.off_central) / scale, "#D55E00"),
     ]
-    for t in check.tightened:
+    for t, colour in zip(check.tightened, TIGHTENED, strict=False):
         if t.reading.sweep.probe.name == made.probe.name:
             errors = np.abs(t.reading.sweep.off_central) / scale
-            found.append(Curve(f"central, tightened x {t.factor:g}", t.reading.sweep.h, errors, "#0072B2"))
+            found.append(Curve(f"central, tightened x {t.factor:g}", t.reading.sweep.h, errors, colour))
     if reading.noise:
-        found.append(Curve("noise of J over h", made.h, reading.noise / (math.sqrt(2.0) * made.h) / scale, "#999999"))
+        least = min((10.0**y for c in found for _, y in c.points), default=0.0)
+        noise = reading.noise / (math.sqrt(2.0) * made.h) / scale
+        found.append(Curve("noise of J over h", made.h, np.where(noise >= least, noise, np.nan), "#999999"))
     return f"error of quotients along {made.probe.name}, relative", found
 
 
 def svg(titled: tuple[str, Sequence[Curve]]) -> str:
     """Log-log, decades as grid lines."""
     title, found = titled
-    points = [p for c in found for p in c.points if p[1] <= 1.0]
+    points = [p for c in found for p in c.points if p[1] <= HIGHEST]
     if not points:
         return f"<p>{escape(title)}: nothing to draw</p>"
     xs, ys = zip(*points, strict=True)
@@ -99,20 +105,20 @@ def svg(titled: tuple[str, Sequence[Curve]]) -> str:
 
     def at(x: float, y: float) -> tuple[float, float]:
         right, up = (x - x_0) / (x_1 - x_0), (y - y_0) / (y_1 - y_0)
-        return LEFT + right * (WIDTH - LEFT - 8), HEIGHT - BOTTOM - up * (HEIGHT - BOTTOM - TOP)
+        return LEFT + right * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - BOTTOM - TOP)
 
     parts = [f"<svg viewBox='0 0 {WIDTH} {HEIGHT + 20 * len(found)}' width='{WIDTH}' role='img'>"]
     parts.append(f"<title>{escape(title)}</title>")
-    for x in range(x_0, x_1 + 1, max(1, (x_1 - x_0) // 8)):
+    for x in range(x_0, x_1 + 1, max(1, math.ceil((x_1 - x_0) / 8))):
         (left, low), (_, high) = at(x, y_0), at(x, y_1)
         parts.append(f"<path d='M{left:.1f} {low:.1f}V{high:.1f}' stroke='#eee'/>")
         parts.append(f"<text x='{left:.1f}' y='{low + 16:.1f}' text-anchor='middle'>1e{x}</text>")
-    for y in range(y_0, y_1 + 1, max(1, (y_1 - y_0) // 8)):
+    for y in range(y_0, y_1 + 1, max(1, math.ceil((y_1 - y_0) / 8))):
         (left, low), (right, _) = at(x_0, y), at(x_1, y)
         parts.append(f"<path d='M{left:.1f} {low:.1f}H{right:.1f}' stroke='#eee'/>")
         parts.append(f"<text x='{LEFT - 6}' y='{low + 4:.1f}' text-anchor='end'>1e{y}</text>")
     for k, curve in enumerate(found):
-        places = [at(*p) for p in curve.points if p[1] <= 1.0]
+        places = [at(*p) for p in curve.points if p[1] <= HIGHEST]
         line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
         dash = "" if k < 2 else " stroke-dasharray='5 3'"
         parts.append(f"<polyline points='{line}' fill='none' stroke='{curve.colour}' stroke-width='1.5'{dash}/>")
@@ -121,7 +127,7 @@ def svg(titled: tuple[str, Sequence[Curve]]) -> str:
         legend = HEIGHT + 20 * k + 6
         parts.append(f"<rect x='{LEFT}' y='{legend - 8}' width='14' height='4' fill='{curve.colour}'/>")
         parts.append(f"<text x='{LEFT + 22}' y='{legend}'>{escape(curve.name)}</text>")
-    parts.append(f"<text x='{WIDTH - 8}' y='{HEIGHT - 8}' text-anchor='end'>h, relative</text></svg>")
+    parts.append(f"<text x='{WIDTH - RIGHT}' y='{HEIGHT - 8}' text-anchor='end'>h, relative</text></svg>")
     return f"<figcaption>{escape(title)}</figcaption>{''.join(parts)}"
 
 
@@ -156,10 +162,14 @@ def _findings(check: Check) -> str:
     return _table(("test", "", "value", "limit", ""), rows)
 
 
+def _td(cell: str) -> str:
+    return f"<td{' class=short' if len(cell) < SHORT else ''}>{escape(cell)}</td>"
+
+
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     body = ""
     for row in rows:
         mark = " class='no'" if "NO" in row or "plateau" in row else ""
-        body += f"<tr{mark}>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+        body += f"<tr{mark}>" + "".join(_td(cell) for cell in row) + "</tr>"
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
