@@ -20,7 +20,7 @@ from bench.timing import Samples
 from problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
-SCHEMA = 3  # 2: columns partial and tape_bytes_per_iteration; 3: tables of studies
+SCHEMA = 4  # 2: columns partial and tape_bytes_per_iteration; 3: tables of studies; 4: kink
 PATIENCE = 60.0  # [s] to wait for another writer
 TABLES: dict[str, tuple[Column, ...]] = {
     "cases": (KEYS[0], KEYS[1], *STORED),
