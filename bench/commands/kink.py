@@ -22,7 +22,7 @@ from bench.commands.shared import (
     store_option,
 )
 from bench.commands.verdict import built, now, one_problem, writable
-from problems.errors import InputError
+from problems.errors import InputError, NotConverged
 
 if TYPE_CHECKING:
     from bench.case import RouteSpec
@@ -77,7 +77,7 @@ def kink(
     routes kink --problem 'bar[stop=multiplier]'
     routes kink --problem 'bar[stop=softplus]' --route adjoint
 
-    Exit code: 0 measured, 1 no forward solve converged, 2 wrong usage.
+    Exit code: 0 measured, 1 forward solves failed, 2 wrong usage.
     """
     import numpy as np
 
@@ -117,7 +117,7 @@ def kink(
         _show(swept, traded, problem, not no_plot, None if lost else kept)
     if lost is not None:
         complain(f"not kept: {lost}")
-    if swept is not None and all(visit.reason for visit in swept.visits):
+    if swept is not None and swept.failed:
         sys.exit(1)
 
 
@@ -127,21 +127,24 @@ def _measured(
     """The sweep where the law has a kink, the trade where a stop yields; the latter by one route."""
     from bench import case
     from bench.studies import kink
-    from bench.studies.rounding import trade, width_of, yielding
+    from bench.studies.rounding import GRADIENTS, trade, width_of, yielding
 
     stop = yielding(ray.problem)
     swept = kink.kink(ray, specs, s, budget) if stop is None or width_of(stop) is None else None
     if stop is None or (swept is not None and swept.event is None):
         return swept, None
-    runnable = [spec for spec in (specs if named else case.routes(["adjoint"])) if not _objection(ray, spec)]
-    if not runnable:
-        reasons = "; ".join(str(_objection(ray, spec)) for spec in specs)
-        raise InputError(f"kink: {reasons} - choose another route")
-    return swept, trade(ray, stop, runnable[0], s[0], s[-1])
-
-
-def _objection(ray: Ray, spec: RouteSpec) -> str | None:
-    return spec.route.objection(ray.problem, **spec.options)
+    reasons = []
+    for spec in specs if named else case.routes(["adjoint"]):
+        reason = kink.why_not(ray, spec, 1.0, GRADIENTS, budget)
+        if reason is None:
+            break
+        reasons.append(reason)
+    else:
+        raise InputError(f"kink: {'; '.join(reasons)} - choose another route")
+    try:
+        return swept, trade(ray, stop, spec, s[0], s[-1])
+    except NotConverged as failure:
+        raise InputError(f"kink: exact contact cannot be had: {failure}") from failure
 
 
 def _show(swept: Kink | None, traded: Trade | None, problem: str, plots: bool, kept: Path | None) -> None:

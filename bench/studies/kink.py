@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from bench.accuracy import Judge, Judges
-from bench.bill import Prices, prices, unaffordable
+from bench.bill import prices, unaffordable
 from bench.case import RouteSpec
 from bench.studies.ray import Gradients, Ray, bisect
 from problems.errors import InputError, RoutesError
@@ -26,6 +26,8 @@ from routes.route import Route
 Side = Literal["left", "right"]
 ONE_SIDED = float(np.finfo(np.float64).eps) ** 0.5  # step of one-sided quotients, relative to s
 STENCILS = tuple(10.0**-k for k in range(1, 9))  # steps over the event, relative to s
+NEAR, NEARBY = 1.05, 24  # from s / NEAR to s NEAR so many more visits, to see the event from near
+NOTHING = 1e-13  # of the terms of a slope: its rounding
 EXACT = 1e-10  # relative error of a gradient on its branch
 CHOICES = (
     "choose a problem that has, bar[stop=penalty] or bar[stop=multiplier] say, or one rounded, bar[stop=softplus] or"
@@ -79,14 +81,17 @@ class Stencil:
 class Event:
     """Where the active set changes: between the visits left and right, 1e-12 apart relative to s.
 
-    slope_left, slope_right: dJ/ds by the problem's closed form, or by the first exact route; None where nobody knows.
+    slope_left, slope_right  dJ/ds by the problem's closed form, or by the first exact route; None where nobody knows
+    size                     of the terms whose sum they are
+    judge                    who says so
     """
 
     left: Visit
     right: Visit
     slope_left: float | None
     slope_right: float | None
-    judge: str | None
+    size: float = 0.0
+    judge: str | None = None
 
     @property
     def s(self) -> float:
@@ -100,17 +105,28 @@ class Event:
 
     @property
     def says(self) -> str:
-        where = "" if self.left.tip is None else f", the tip at {self.left.tip:.6g} m"
-        sets = f"at s = {self.s:.13g}{where}, {self.left.active_set} becomes {self.right.active_set}"
+        where = "" if self.left.tip is None else f" (E = s E_hat), the tip at {self.left.tip:.6g} m"
+        sets = f"at s = {self.s:.10g}{where}, {self.left.active_set} becomes {self.right.active_set}"
         if self.slope_left is None or self.slope_right is None:
             return f"{sets}; dJ/ds is not known on both sides"
-        slopes = f"dJ/ds = {self.slope_left:.6g} from the left, {self.slope_right:.6g} from the right"
-        return f"{sets}: {slopes}, a jump of {self.slope_right - self.slope_left:.6g}"
+        left, right, jump = (
+            in_words(slope, self.size)
+            for slope in (self.slope_left, self.slope_right, self.slope_right - self.slope_left)
+        )
+        return f"{sets}: dJ/ds = {left} from the left, {right} from the right, a jump of {jump}"
+
+
+def in_words(slope: float, size: float) -> str:
+    """Six digits; 0 where it is the rounding of its terms."""
+    return "0" if abs(slope) <= NOTHING * size else f"{slope:.6g}"
 
 
 @dataclass(frozen=True)
 class Kink:
-    """Everything measured along a ray. `events`: how many the sweep has seen; `event` is the first of them."""
+    """Everything measured along a ray.
+
+    events  how many the sweep has seen; `event` is the first of them, None where `reason` says why it cannot be had
+    """
 
     ray: Ray
     visits: tuple[Visit, ...]
@@ -119,6 +135,7 @@ class Kink:
     events: int
     event: Event | None = None
     stencils: tuple[Stencil, ...] = ()
+    reason: str | None = None
 
     @property
     def routes(self) -> list[RouteSpec]:
@@ -129,13 +146,21 @@ class Kink:
         return [s for s in self.slopes if s.side == side]
 
     @property
+    def failed(self) -> bool:
+        """Whether there is no answer, as forward solves failed."""
+        return self.reason is not None or all(v.reason is not None for v in self.visits)
+
+    @property
     def says(self) -> str:
         """The answer in one sentence."""
         solved = [v for v in self.visits if v.reason is None]
-        low, high = self.visits[0].s, self.visits[-1].s
         if not solved:
+            low, high = self.visits[0].s, self.visits[-1].s
             return f"no s from {low:g} to {high:g} could be solved at: {self.visits[0].reason}"
+        low, high = solved[0].s, solved[-1].s
         tips = [v.tip for v in solved if v.tip is not None]
+        if self.reason is not None:
+            return f"the active set changes, yet where cannot be told: {self.reason}"
         moves = f", its tip at {max(tips):.4g} to {min(tips):.4g} m" if tips else ""
         if self.event is None:
             stays = f"no event: stays {solved[0].active_set} for s from {low:g} to {high:g}{moves}"
@@ -160,17 +185,26 @@ def kink(ray: Ray, routes: Sequence[RouteSpec], s: Sequence[float], budget: floa
     solved = [v for v in visits if v.reason is None]
     if any(v.active_set is None for v in solved):
         raise smooth(problem)
-    reasons = [(r, why_not(ray, r, solved, len(s) + 2, budget)) for r in routes]
+    reasons = [(r, why_not(ray, r, solved[0].s if solved else None, len(s) + NEARBY + 2, budget)) for r in routes]
     runnable = [r for r, reason in reasons if reason is None]
     skipped = tuple((r, reason) for r, reason in reasons if reason is not None)
     pairs = [(a.s, b.s) for a, b in pairwise(solved) if a.active_set != b.active_set]
     places: list[tuple[float, Side | None]] = [(v.s, None) for v in solved]
     if not pairs:
         return Kink(ray, visits, tuple(slopes(ray, runnable, places)), skipped, 0)
-    left, right = (visit(ray, one) for one in bisect(ray, *pairs[0]))
+    try:
+        left, right = (visit(ray, one) for one in bisect(ray, *pairs[0]))
+        why = left.reason or right.reason
+    except RoutesError as failure:
+        why = str(failure)
+    if why is not None:
+        return Kink(ray, visits, tuple(slopes(ray, runnable, places)), skipped, len(pairs), reason=why)
+    nearby = [visit(ray, left.s * NEAR ** float(t)) for t in np.linspace(-1.0, 1.0, NEARBY)]
+    places += [(v.s, None) for v in nearby if v.reason is None]
     found = tuple(slopes(ray, runnable, [*places, (left.s, "left"), (right.s, "right")]))
     event = between(ray, left, right, found)
     stencils = tuple(stencil(ray, event, h) for h in STENCILS)
+    visits = tuple(sorted([*visits, *nearby], key=lambda v: v.s))
     return Kink(ray, visits, found, skipped, len(pairs), event, stencils)
 
 
@@ -190,14 +224,17 @@ def visit(ray: Ray, s: float) -> Visit:
         return Visit(s, reason=str(failure))
 
 
-def why_not(ray: Ray, spec: RouteSpec, solved: Sequence[Visit], gradients: int, budget: float) -> str | None:
-    """Why a route is skipped, in a sentence; None if it runs."""
+def why_not(ray: Ray, spec: RouteSpec, s: float | None, gradients: int, budget: float) -> str | None:
+    """Why a route is skipped, in a sentence; None if it runs. Its bill is priced at s, where that is given."""
     objection = spec.route.objection(ray.problem, **spec.options)
-    if objection is not None or not solved or budget == math.inf:
+    if objection is not None or s is None or budget == math.inf:
         return objection
-    p = ray.p(solved[0].s)
-    options = spec.route.expect(ray.model, p, **spec.options)
-    bill: Prices = prices(ray.model, p)[0]
+    try:
+        p = ray.p(s)
+        options = spec.route.expect(ray.model, p, **(spec.route.defaults | spec.options))
+        bill = prices(ray.model, p)[0]
+    except RoutesError as failure:
+        return str(failure)
     work = spec.route.cost(len(p), bill.declared, **options)
     tape = None if spec.route.tape is None else spec.route.tape(ray.problem, **options)
     reason = unaffordable(gradients * bill.seconds(work), tape, work, budget)
@@ -229,14 +266,15 @@ def slope(gradient: Gradients, s: float, side: Side | None, judge: Callable[[Rou
 def between(ray: Ray, left: Visit, right: Visit, found: Sequence[Slope]) -> Event:
     """The event between two visits, with dJ/ds on both sides by the one who knows best."""
     known = [ray.problem.reference(ray.p(v.s)) for v in (left, right)]
-    if known[0] is not None and known[1] is not None:
-        a, b = (float(r.gradient @ ray.by_s(v.s)) for r, v in zip(known, (left, right), strict=True) if r is not None)
-        return Event(left, right, a, b, known[0].name)
-    for spec in (s.route for s in found if s.side == "left" and s.route.route.accuracy == 0.0):
-        sides = {s.side: s.slope for s in found if s.route == spec}
-        if sides["left"] is not None and sides["right"] is not None:
-            return Event(left, right, sides["left"], sides["right"], spec.route.name)
-    return Event(left, right, None, None, None)
+    terms = [r.gradient * ray.by_s(v.s) for r, v in zip(known, (left, right), strict=True) if r is not None]
+    if known[0] is not None and len(terms) == 2:
+        a, b = (float(t.sum()) for t in terms)
+        return Event(left, right, a, b, max(float(abs(t).sum()) for t in terms), known[0].name)
+    for one in (s for s in found if s.side == "left" and s.route.route.accuracy == 0.0):
+        other = next(s for s in found if s.side == "right" and s.route == one.route)
+        if one.slope is not None and other.slope is not None:
+            return Event(left, right, one.slope, other.slope, max(one.size, other.size), one.route.route.name)
+    return Event(left, right, None, None)
 
 
 def stencil(ray: Ray, event: Event, step: float) -> Stencil:

@@ -57,7 +57,7 @@ def of_kink(kink: Kink) -> list[Row]:
 def _event(kink: Kink) -> Row:
     event = kink.event
     if event is None:
-        return {"kind": "event", "status": "none", "reason": kink.says}
+        return {"kind": "event", "status": "failed" if kink.failed else "none", "reason": kink.says}
     return {
         "kind": "event",
         "status": "ok",

@@ -18,6 +18,7 @@ from problems.stop import Compliant, Penalty, Quadratic, Rigid, Softplus
 
 WIDTHS = tuple(10.0**-k for k in range(-1, 6))  # times the problem's own
 STIFFNESSES = tuple(10.0**k for k in range(-1, 6))
+GRADIENTS = 2 * 3 * len(WIDTHS) + 3  # of one trade
 LOCAL = 1e-2  # of the width: steps by which the curvature is differenced
 
 

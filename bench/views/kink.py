@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import log
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from bench.studies.kink import EXACT, Kink, Slope
+from bench.studies.kink import EXACT, NEAR, Kink, Slope, in_words
 from bench.studies.kink_rows import named
 from bench.studies.rounding import Trade, Traded, width_of
 from bench.views.format import number
@@ -17,8 +18,7 @@ from bench.views.panel import panel
 from bench.views.tables import show
 
 WIDEST = 100  # columns of a plot
-NOTHING = 1e-13  # of the terms of a slope: its rounding
-NEAR = 1.6  # the plot reaches so many times the event's s on both sides
+ROUNDED = 1.0 + 1e-9  # s is
 
 
 def show_kink(out: Console, kink: Kink, problem: str, plots: bool = True) -> None:
@@ -52,8 +52,9 @@ def sides(kink: Kink) -> Table:
     """One row a route: dJ/ds just beside the event and how wrong the gradient is, there and over the sweep."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     table.add_column("route", overflow="fold", min_width=14)
-    for name in ("dJ/ds left", "dJ/ds right", "error left", "error right", "worst in the sweep"):
-        table.add_column(name, justify="right", no_wrap=name != "worst in the sweep", min_width=8)
+    for name in ("dJ/ds left", "dJ/ds right", "error left", "error right"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("worst in the sweep", justify="right", overflow="fold", min_width=8)
     for spec in kink.routes:
         left, right = (next(s for s in kink.on(side) if s.route == spec) for side in ("left", "right"))
         errors = [s.error for s in kink.slopes if s.route == spec and s.side is None and s.error is not None]
@@ -68,7 +69,7 @@ def sides(kink: Kink) -> Table:
 def _slope(slope: Slope) -> str:
     if slope.slope is None:
         return "failed"
-    return "0" if abs(slope.slope) <= NOTHING * slope.size else f"{slope.slope:.6g}"
+    return in_words(slope.slope, slope.size)
 
 
 def _error(slope: Slope) -> str:
@@ -116,7 +117,11 @@ def curves(kink: Kink, width: int) -> Text:
     """J and dJ/ds over s near the event, marked by the first letter of the active set."""
     event = kink.event
     assert event is not None
-    visits = [v for v in kink.visits if v.objective is not None and event.s / NEAR <= v.s <= event.s * NEAR]
+    visits = [
+        v
+        for v in kink.visits
+        if v.objective is not None and event.s / NEAR <= v.s * ROUNDED and v.s <= event.s * NEAR * ROUNDED
+    ]
     visits = sorted([*visits, event.left, event.right], key=lambda v: v.s)
     shown = {v.s: str(v.active_set)[:1] for v in visits}
     J = [(v.s, v.objective, shown[v.s]) for v in visits if v.objective is not None]
@@ -137,26 +142,59 @@ def _marks(kink: Kink) -> str:
 
 
 def remarks(kink: Kink) -> list[str]:
-    """Why a route or a point is missing, each once."""
+    """Why routes and points are missing, each reason once a route."""
     lines = [f"skipped: {named(spec)}: {why}" for spec, why in kink.skipped]
-    lines += [f"failed: s = {v.s:g}: {v.reason}" for v in kink.visits if v.reason]
-    lines += [f"failed: {named(s.route)} at s = {s.s:g}: {s.reason}" for s in kink.slopes if s.reason]
-    return list(dict.fromkeys(lines))
+    failed = [v for v in kink.visits if v.reason is not None]
+    if failed:
+        lines.append(f"failed: {len(failed)} of {len(kink.visits)} s, first {failed[0].s:g}: {failed[0].reason}")
+    for spec in kink.routes:
+        missing = [s for s in kink.slopes if s.route == spec and s.reason is not None]
+        if missing:
+            where = f"{len(missing)} s, first {missing[0].s:g}"
+            lines.append(f"failed: {named(spec)} at {where}: {missing[0].reason}")
+    return lines
 
 
 def show_trade(out: Console, trade: Trade, problem: str) -> None:
-    """Where the stop presses or not, then where exact contact has its kink."""
+    """At s = 1, where the stop is as it was asked for, then where exact contact has its kink."""
     wrap, route = not out.is_terminal, named(trade.route)
     rounded = width_of(trade.rows[0].stop) is not None
     if rounded:
-        out.print(Text.assemble((problem, "bold"), ": no event: its law is rounded over a width, so dJ/ds never jumps"))
+        kinked = "" if trade.event is None else f"; exact contact has a kink at s = {trade.event:.10g}"
+        said = f": no event: the law of the stop is rounded over a width, and dJ/ds does not jump{kinked}"
+        out.print(Text.assemble((problem, "bold"), said), soft_wrap=wrap)
     for s in trade.at:
-        where = "the bar just meets the stop: exact contact has its kink" if s == trade.event else "the point asked for"
+        rows = [row for row in trade.rows if row.s == s]
         out.print()
-        out.print(Text(f"s = {s:.6g}, {where}; exact contact by a multiplier, dJ/ds by {route}"), soft_wrap=wrap)
-        show(out, traded([row for row in trade.rows if row.s == s], rounded))
+        title = f"s = {s:.10g}{', the kink of exact contact' if s == trade.event else ''}; dJ/ds by {route}"
+        out.print(Text(title, style="bold"), soft_wrap=wrap)
+        show(out, traded(rows, rounded))
+        for line in rates(rows) if rounded and s == trade.event else yields(rows) if rounded else []:
+            out.print(Text(line), soft_wrap=wrap)
+    out.print(Text("exact: a stop that does not yield, by a multiplier; the data are the same", style="dim"))
     if rounded and trade.event is None:
-        out.print("no kink of exact contact in this range: widen --range to see what the width rounds", soft_wrap=wrap)
+        out.print("no kink of exact contact in this range - widen --range to see what the width rounds", soft_wrap=wrap)
+
+
+def yields(rows: Sequence[Traded]) -> list[str]:
+    """What is left of the error where the width is least."""
+    last = rows[-1]
+    if last.off_objective is None:
+        return []
+    return [
+        f"what no width removes, {last.off_objective:.2g} in J, is the stop's yielding: k_c = {last.stop.law.k_c:g}"
+    ]
+
+
+def rates(rows: Sequence[Traded]) -> list[str]:
+    """Powers of the width, by its least two."""
+    (w, J, bend), (w_next, J_next, bend_next) = (
+        (width_of(row.stop), row.off_objective, row.curvature) for row in rows[-2:]
+    )
+    if not (w and w_next and J and J_next and bend and bend_next):
+        return []
+    error, curvature = (log(after / before) / log(w_next / w) for before, after in ((J, J_next), (bend, bend_next)))
+    return [f"|J - J_exact| ~ width^{error:.2f}, paid by d2J/ds2 ~ width^{curvature:.2f}"]
 
 
 def traded(rows: Sequence[Traded], rounded: bool) -> Table:
