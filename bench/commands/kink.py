@@ -22,11 +22,11 @@ from bench.commands.shared import (
     store_option,
 )
 from bench.commands.verdict import built, now, one_problem, writable
-from problems.errors import InputError, NotConverged
+from problems.errors import InputError, NotConverged, SingularMatrix
 
 if TYPE_CHECKING:
     from bench.case import RouteSpec
-    from bench.studies.kink import Kink
+    from bench.studies.event import Kink
     from bench.studies.ray import Ray
     from bench.studies.rounding import Trade
     from routes.factorization import LinearSolver
@@ -101,8 +101,11 @@ def kink(
     made, p = built(one_problem(problem), at)
     writable(None, kept)
     ray = Ray(made, p, solver)
-    with np.errstate(all="ignore"):
-        swept, traded = _measured(ray, specs, bool(routes), np.geomspace(low, high, points).tolist(), budget)
+    try:
+        with np.errstate(all="ignore"):
+            swept, traded = _measured(ray, specs, bool(routes), np.geomspace(low, high, points).tolist(), budget)
+    except (NotConverged, SingularMatrix) as failure:
+        raise InputError(f"kink: {failure}") from failure
     found = rows(swept, traded, {"problem": problem, "at": at})
     lost = None
     try:
@@ -140,11 +143,10 @@ def _measured(
             break
         reasons.append(reason)
     else:
+        if swept is not None:
+            return swept, None
         raise InputError(f"kink: {'; '.join(reasons)} - choose another route")
-    try:
-        return swept, trade(ray, stop, spec, s[0], s[-1])
-    except NotConverged as failure:
-        raise InputError(f"kink: exact contact cannot be had: {failure}") from failure
+    return swept, trade(ray, stop, spec, s[0], s[-1])
 
 
 def _show(swept: Kink | None, traded: Trade | None, problem: str, plots: bool, kept: Path | None) -> None:

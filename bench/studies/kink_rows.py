@@ -6,7 +6,7 @@ from collections.abc import Hashable
 
 from bench.case import RouteSpec
 from bench.rows import Row
-from bench.studies.kink import Kink
+from bench.studies.event import Kink
 from bench.studies.rounding import Trade, width_of
 from bench.study_rows import KINK
 from bench.views.format import selector
