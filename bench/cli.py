@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bench.commands.check import check
+from bench.commands.kink import kink
 from bench.commands.shared import (
     SELECTOR,
     at_option,
@@ -95,6 +96,7 @@ def main() -> None:
 
 main.add_command(vcurve)
 main.add_command(check)
+main.add_command(kink)
 
 
 @main.command("list")

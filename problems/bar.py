@@ -8,6 +8,7 @@ Beyond the tip there may be a stop (problems/stop.py): its force makes the probl
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -18,7 +19,7 @@ from problems.errors import InputError
 from problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Reference, Traced
 from problems.regularization import tikhonov, tikhonov_gradient
 from problems.sensors import Nodes, Sensors, measured, parse_nodes
-from problems.stop import GAP, K_C, WIDTH, StopName, stop_of
+from problems.stop import GAP, K_C, WIDTH, Stop, StopName, stop_of
 
 L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
 THETA_MAX = 170.0  # E = exp(theta) < 1e74: the squares and cubes of E in J and dJ/dE stay in float64's range
@@ -74,11 +75,8 @@ class Bar(Problem):
             raise InputError(f"bar: seed={seed} - choose seed >= 0")
         if data is not None and noise > 0:
             raise InputError("bar: noise= is added to synthetic data only - drop it or drop data=")
-        self.stop = stop_of(stop, gap, k_c, width, "bar")
         self.n, self.n_state, self.structure = n, n, "spd"
-        if self.stop is not None:
-            self.n_state, self.structure = n + self.stop.multipliers, self.stop.structure
-            self.linear, self.line_search = False, False  # q is convex: full steps converge, from one side
+        self._meet(stop_of(stop, gap, k_c, width, "bar"))
         self.log = parametrization == "log"
         self.alpha = alpha
         self.L_e = L / n
@@ -102,9 +100,6 @@ class Bar(Problem):
             label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
             position=self.x[:, None],
         )
-        self._shared: dict[str, Any] = {
-            "parametrization": parametrization, "alpha": alpha, "stop": stop, "gap": gap, "k_c": k_c, "width": width
-        }  # fmt: skip
         self._look()
 
     def _look(self) -> None:
@@ -112,12 +107,26 @@ class Bar(Problem):
         self.last_sensor = int(self.sensors.nodes.max(initial=0))
         self.notes = self._notes()
 
+    def _meet(self, stop: Stop | None) -> None:
+        self.stop = stop
+        if stop is not None:
+            self.n_state, self.structure = self.n + stop.multipliers, stop.structure
+            self.linear, self.line_search = False, False  # q is convex: full steps converge, from one side
+
+    def behind(self, stop: Stop) -> Bar:
+        """This bar with the same data and another stop, whose effect on them is so left out."""
+        other = copy(self)
+        other._meet(stop)
+        other.notes = other._notes()
+        return other
+
     def refined(self, p: Array) -> tuple[Bar, Array] | None:
         """Every element in two, the same data at the same places."""
         if 2 * self.n > N_MAX:
             return None
-        finer = Bar(n=2 * self.n, sensors=0, **self._shared)
+        finer = Bar(n=2 * self.n, sensors=0, parametrization="log" if self.log else "raw", alpha=self.alpha)
         finer.sensors, finer.synthetic = Sensors(2 * self.sensors.nodes, self.sensors.d), self.synthetic
+        finer._meet(self.stop)
         finer._look()
         return finer, np.repeat(p, 2)
 

@@ -21,7 +21,13 @@ GAP, K_C, WIDTH = 0.8, 100.0, 0.01  # [m] the bar at E = 1 reaches 1; [N/m]; [m]
 
 
 class Law(Protocol):
-    """q(g), convex and increasing; the real part of a complex g chooses the branch. xp: numpy or jax.numpy."""
+    """q(g), convex and increasing; the real part of a complex g chooses the branch. xp: numpy or jax.numpy.
+
+    k_c [N/m] is the stiffness far beyond the gap.
+    """
+
+    @property
+    def k_c(self) -> float: ...
 
     def force(self, g: Any, xp: Any = np) -> Any:
         """q [N]."""

@@ -9,8 +9,10 @@ import pytest
 from conftest import relative_error, somewhere, zoo
 
 from problems.bar import Bar, true_modulus
+from problems.block import Block
 from problems.errors import DomainError, InputError
 from problems.problem import Offers, Problem
+from routes.model import Model
 
 ZOO = zoo()
 everywhere = pytest.mark.parametrize("name", ZOO)
@@ -122,6 +124,47 @@ def test_closed_form_equals_dense_algebra(name: str) -> None:
     reference = bar.reference(p)
     assert relative_error(reference.gradient, g) < 1e-11  # cond(R_u) eps of the dense solves
     assert reference.size >= np.linalg.norm(reference.gradient) * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("name", [n for n in ZOO if n.startswith("bar")])
+def test_a_bar_of_twice_as_many_elements_is_the_same_bar(name: str) -> None:
+    """Constant in every element, its moduli give the same displacements at the same places."""
+    bar = ZOO[name]
+    p = somewhere(bar)
+    finer, q = bar.refined(p)
+    assert (finer.n, len(q)) == (2 * bar.n, 2 * len(p))
+    J, J_finer = (Model(problem).value(at) for problem, at in ((bar, p), (finer, q)))
+    assert J_finer == pytest.approx(J, rel=1e-10)
+    g, g_finer = bar.reference(p).gradient, finer.reference(q).gradient
+    if not bar.alpha:  # a jump of theta between two halves costs Phi something, and none is there
+        np.testing.assert_allclose(g_finer.reshape(-1, 2).sum(axis=1), g, rtol=1e-10, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("options", "n_p"),
+    [
+        ({}, 64),
+        ({"unknown": "layers", "layers": 3, "n": 3}, 3),
+        ({"unknown": "constants"}, 2),
+        ({"unknown": "load"}, 1),
+    ],
+)
+def test_a_block_of_eight_times_as_many_cells_inherits_p(options: dict, n_p: int) -> None:
+    block = Block(**{"n": 2} | options)
+    p = somewhere(block)
+    finer, q = block.refined(p)
+    assert finer.n_state > 4 * block.n_state
+    assert len(q) == len(finer.parameters) == n_p
+    if "unknown" not in options:
+        x, x_finer = block.parameters.position, finer.parameters.position
+        parents = [int(np.flatnonzero((np.abs(x - at) < 0.25).all(axis=1))[0]) for at in x_finer]
+        np.testing.assert_array_equal(q, p[parents])
+
+
+@pytest.mark.parametrize("options", [{"unknown": "shape"}, {"unknown": "traction"}])
+def test_unknowns_of_one_mesh_have_no_finer_one(options: dict) -> None:
+    block = Block(n=2, **options)
+    assert block.refined(block.parameters.start) is None
 
 
 def test_synthetic_data_are_those_of_the_truth() -> None:

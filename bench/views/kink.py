@@ -1,0 +1,213 @@
+"""A kink for a person: the event in a sentence, routes on both sides of it, stencils over it, the curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import log
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from bench.studies.event import Kink, Slope, in_words
+from bench.studies.kink import EXACT, NEAR
+from bench.studies.kink_rows import named
+from bench.studies.rounding import Trade, Traded, width_of
+from bench.views.format import number
+from bench.views.palette import route_style
+from bench.views.panel import panel
+from bench.views.tables import show
+
+WIDEST = 100  # columns of a plot
+ROUNDED = 1.0 + 1e-9  # s is
+
+
+def show_kink(out: Console, kink: Kink, problem: str, plots: bool = True) -> None:
+    """The sentence first; then what it rests on."""
+    wrap = not out.is_terminal
+    out.print(Text.assemble((problem, "bold"), ": ", kink.says), soft_wrap=wrap)
+    if kink.event is not None:
+        if kink.routes:
+            out.print()
+            show(out, sides(kink))
+        for line in judged(kink):
+            out.print(Text(line), soft_wrap=wrap)
+        out.print()
+        show(out, stencils(kink))
+        out.print(Text(over(kink)), soft_wrap=wrap)
+        if plots:
+            out.print()
+            out.print(curves(kink, min(out.width, WIDEST)))
+    for line in remarks(kink):
+        out.print(Text(line, style="dim"), soft_wrap=wrap)
+
+
+def _table(*names: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    for name in names:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
+
+
+def sides(kink: Kink) -> Table:
+    """One row a route: dJ/ds just beside the event and how wrong the gradient is, there and over the sweep."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("route", overflow="fold", min_width=14)
+    for name in ("dJ/ds left", "dJ/ds right", "error left", "error right"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("worst in the sweep", justify="right", overflow="fold", min_width=8)
+    for spec in kink.routes:
+        left, right = (next(s for s in kink.on(side) if s.route == spec) for side in ("left", "right"))
+        errors = [s.error for s in kink.slopes if s.route == spec and s.side is None and s.error is not None]
+        cells = [_slope(left), _slope(right), _error(left), _error(right), number(max(errors, default=None), 2)]
+        table.add_row(Text(named(spec)), *cells, style=route_style(spec.route.name))
+    event = kink.event
+    assert event is not None
+    table.add_row("differences of J", number(event.left.backward, 6), number(event.right.forward, 6), style="dim")
+    return table
+
+
+def _slope(slope: Slope) -> str:
+    if slope.slope is None:
+        return "failed"
+    return in_words(slope.slope, slope.size)
+
+
+def _error(slope: Slope) -> str:
+    return "" if slope.reason is not None else number(slope.error, 2) or "unknown"
+
+
+def judged(kink: Kink) -> list[str]:
+    """Who is exact on both branches, and who is not."""
+    worst = {
+        named(spec): max(
+            (s.error if s.error is not None else float("inf")) for s in kink.slopes if s.route == spec and s.side
+        )
+        for spec in kink.routes
+    }
+    references = dict.fromkeys(s.reference for s in kink.slopes if s.side and s.error is not None)
+    exact = [name for name, error in worst.items() if error <= EXACT]
+    others = [f"{name} ({error:.2g})" for name, error in worst.items() if EXACT < error < float("inf")]
+    against = " and ".join(str(r) for r in references)
+    lines = [f"exact on either branch, to {EXACT:.0e} against the {against}: {', '.join(exact)}"] if exact else []
+    if others:
+        lines.append(
+            f"not exact beside the event, worst error: {', '.join(others)}; steps of differences reach over it"
+        )
+    return lines
+
+
+def stencils(kink: Kink) -> Table:
+    """Central quotients over the event at decreasing steps."""
+    table = _table("h / s", "central quotient over it", "off the left", "off the right")
+    for one in kink.stencils:
+        cells = (f"{one.step:.0e}", number(one.quotient, 6), number(one.off_left, 3), number(one.off_right, 3))
+        table.add_row(*cells) if one.reason is None else table.add_row(cells[0], "failed")
+    return table
+
+
+def over(kink: Kink) -> str:
+    event = kink.event
+    if event is None or event.jump is None or event.slope_left is None:
+        return "which of the two they come near is not known"
+    mean, half = event.slope_left + 0.5 * event.jump, abs(0.5 * event.jump)
+    return f"no step helps: they tend to the mean of the two slopes, {mean:.6g}, which is {half:.6g} off either"
+
+
+def curves(kink: Kink, width: int) -> Text:
+    """J and dJ/ds over s near the event, marked by the first letter of the active set."""
+    event = kink.event
+    assert event is not None
+    visits = [
+        v
+        for v in kink.visits
+        if v.objective is not None and event.s / NEAR <= v.s * ROUNDED and v.s <= event.s * NEAR * ROUNDED
+    ]
+    visits = sorted([*visits, event.left, event.right], key=lambda v: v.s)
+    shown = {v.s: str(v.active_set)[:1] for v in visits}
+    J = [(v.s, v.objective, shown[v.s]) for v in visits if v.objective is not None]
+    text = panel(J, f"J, {_marks(kink)}", "s", width, wall=event.s)
+    best = next((spec for spec in kink.routes if spec.route.accuracy == 0.0), None)
+    slopes = [s for s in kink.slopes if s.route == best and s.s in shown and s.slope is not None]
+    if slopes:
+        found = [(s.s, s.slope, shown[s.s]) for s in slopes if s.slope is not None]
+        text.append("\n\n")
+        text.append(panel(found, f"dJ/ds by {slopes[0].route.route.name}", "s", width, 13, event.s))
+    return text
+
+
+def _marks(kink: Kink) -> str:
+    assert kink.event is not None
+    names = [str(v.active_set) for v in (kink.event.left, kink.event.right)]
+    return ", ".join(f"{name[:1]} {name}" for name in names)
+
+
+def remarks(kink: Kink) -> list[str]:
+    """Why routes and points are missing, each reason once a route."""
+    lines = [f"skipped: {named(spec)}: {why}" for spec, why in kink.skipped]
+    failed = [v for v in kink.visits if v.reason is not None]
+    if failed:
+        lines.append(f"failed: {len(failed)} of {len(kink.visits)} s, first {failed[0].s:g}: {failed[0].reason}")
+    for spec in kink.routes:
+        missing = [s for s in kink.slopes if s.route == spec and s.reason is not None]
+        if missing:
+            where = f"{len(missing)} s, first {missing[0].s:g}"
+            lines.append(f"failed: {named(spec)} at {where}: {missing[0].reason}")
+    return lines
+
+
+def show_trade(out: Console, trade: Trade, problem: str) -> None:
+    """At s = 1, where the stop is as it was asked for, then where exact contact has its kink."""
+    wrap, route = not out.is_terminal, named(trade.route)
+    rounded = width_of(trade.rows[0].stop) is not None
+    if rounded:
+        kinked = "" if trade.event is None else f"; exact contact has a kink at s = {trade.event:.10g}"
+        said = f": no event: the law of the stop is rounded over a width, and dJ/ds does not jump{kinked}"
+        out.print(Text.assemble((problem, "bold"), said), soft_wrap=wrap)
+    for s in trade.at:
+        rows = [row for row in trade.rows if row.s == s]
+        out.print()
+        title = f"s = {s:.10g}{', the kink of exact contact' if s == trade.event else ''}; dJ/ds by {route}"
+        out.print(Text(title, style="bold"), soft_wrap=wrap)
+        show(out, traded(rows, rounded))
+        for line in rates(rows) if rounded and s == trade.event else yields(rows) if rounded else []:
+            out.print(Text(line), soft_wrap=wrap)
+    out.print(Text("exact: a stop that does not yield, by a multiplier; the data are the same", style="dim"))
+    if rounded and trade.event is None:
+        out.print("no kink of exact contact in this range - widen --range to see what the width rounds", soft_wrap=wrap)
+
+
+def yields(rows: Sequence[Traded]) -> list[str]:
+    """What is left of the error where the width is least."""
+    last = rows[-1]
+    if last.off_objective is None:
+        return []
+    return [
+        f"what no width removes, {last.off_objective:.2g} in J, is the stop's yielding: k_c = {last.stop.law.k_c:g}"
+    ]
+
+
+def rates(rows: Sequence[Traded]) -> list[str]:
+    """Powers of the width, by its least two."""
+    (w, J, bend), (w_next, J_next, bend_next) = (
+        (width_of(row.stop), row.off_objective, row.curvature) for row in rows[-2:]
+    )
+    if not (w and w_next and J and J_next and bend and bend_next):
+        return []
+    error, curvature = (log(after / before) / log(w_next / w) for before, after in ((J, J_next), (bend, bend_next)))
+    return [f"|J - J_exact| ~ width^{error:.2f}, paid by d2J/ds2 ~ width^{curvature:.2f}"]
+
+
+def traded(rows: Sequence[Traded], rounded: bool) -> Table:
+    """One row a variant of the stop."""
+    names = ("u_N - gap", "J", "|J - J_exact|", "|dJ/ds - exact|", "d2J/ds2", "Newton steps")
+    table = _table("width" if rounded else "k_c", *(n for n in names if rounded or n != "d2J/ds2"))
+    for one in rows:
+        varied = f"{width_of(one.stop) if rounded else one.stop.law.k_c:g}"
+        if one.reason is not None:
+            table.add_row(varied, "failed")
+            continue
+        values = (one.penetration, one.objective, one.off_objective, one.off_slope)
+        cells = [number(v, d) for v, d in zip(values, (3, 4, 2, 2), strict=True)]
+        table.add_row(varied, *cells, *([number(one.curvature, 3)] if rounded else []), str(one.iterations))
+    return table
