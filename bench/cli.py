@@ -18,16 +18,13 @@ from bench.commands.kink import kink
 from bench.commands.shared import (
     SELECTOR,
     at_option,
+    checked,
     complain,
     debug_option,
     debugging,
-    linear_solver_option,
-    max_steps_option,
-    newton_option,
-    no_store_option,
-    rtol_option,
-    solver_of,
+    solver_options,
     store_option,
+    store_options,
 )
 from bench.commands.tolerance import tolerance
 from bench.commands.unrolling import unrolling
@@ -37,8 +34,7 @@ from problems.errors import DomainError, InputError
 if TYPE_CHECKING:
     from bench.rows import Row
     from bench.runner import Outcome, View
-    from routes.factorization import LinearSolver
-    from routes.newton import Newton
+    from routes.newton import Solver
 
 WRONG_USAGE, INTERRUPTED = 2, 130
 SHOWN = "-"  # --gradient without a file
@@ -61,7 +57,8 @@ class Routes(click.Group):
             complain(f"{error.format_message()} - see {about} --help")
             ctx.exit(WRONG_USAGE)
         except KeyboardInterrupt:
-            complain("interrupted - finished cases are printed, and kept unless --no-store")
+            what = "finished cases are printed, and kept unless --no-store"
+            complain(f"interrupted - {what if ctx.invoked_subcommand == 'run' else 'nothing is kept'}")
             ctx.exit(INTERRUPTED)
         except BrokenPipeError:
             raise  # click ends quietly: whoever read has read enough
@@ -91,6 +88,8 @@ def main() -> None:
     routes list                                   what exists, with all options
     routes run --problem bar --route adjoint      one gradient, its bill and its error
     routes run --problem 'bar[n=8|64]' --route all
+    routes vcurve --problem bar --route adjoint   is it right? differences at every step, and a verdict
+    routes check my_model.py:Model                the same for anyone's code
     """
 
 
@@ -127,18 +126,14 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 @at_option
 @click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
 @click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
-@rtol_option
-@max_steps_option
-@linear_solver_option
-@newton_option
+@solver_options
 @click.option("--components", type=int, metavar="M", help=COMPONENTS)
 @click.option("--directions", type=int, metavar="M", help=DIRECTIONS)
 @click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
 @click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
-@store_option
-@no_store_option
+@store_options
 @debug_option
 def run(
     problems: tuple[str, ...],
@@ -146,18 +141,14 @@ def run(
     at: str,
     budget: float,
     min_time: float,
-    rtol: float,
-    max_steps: int,
-    linear_solver: LinearSolver,
-    newton: Newton,
+    solver: Solver,
     components: int | None,
     directions: int | None,
     seed: int,
     gradient: str | None,
     vtu: Path | None,
     as_json: bool,
-    store: Path,
-    no_store: bool,
+    kept: Path | None,
 ) -> None:
     """Compute dJ/dp by every route named, on every problem named; say what it cost and how wrong it is.
 
@@ -172,22 +163,21 @@ def run(
     from bench.runner import run as run_cases
     from bench.store import Store
 
-    if not budget > 0:
-        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     partial = chosen(components, directions, seed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
-    files.check(len(problem_specs) * len(route_specs), partial, [store, *case.files(problem_specs, at)])
+    files.check(
+        len(problem_specs) * len(route_specs), partial, [*([kept] if kept else []), *case.files(problem_specs, at)]
+    )
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
-    solver = solver_of(rtol, max_steps, linear_solver, newton)
-    settings = Settings(at, budget, min_time, gradient is not None, solver, partial, vtu is not None)
+    settings = Settings(at, checked(budget), min_time, gradient is not None, solver, partial, vtu is not None)
     outcomes = run_cases(problem_specs, route_specs, settings)
-    kept = None if no_store else Store(store)
-    if kept is not None:
-        kept.check_writable()
+    store = None if kept is None else Store(kept)
+    if store is not None:
+        store.check_writable()
     done: list[Outcome] = []
     lost: list[str] = []
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
@@ -195,8 +185,8 @@ def run(
         for outcome in with_progress(outcomes, len(problem_specs) * len(route_specs)):
             done.append(outcome)
             try:
-                if kept is not None:
-                    kept.append(outcome.row, outcome.samples)
+                if store is not None:
+                    store.append(outcome.row, outcome.samples)
             except InputError as error:  # a full disk, a lock: the row is printed all the same
                 lost.append(str(error))
             if as_json:
@@ -204,7 +194,7 @@ def run(
     finally:  # an interrupt leaves what was measured on the screen, too
         if not as_json:
             views = [(o.row, o.view) for o in done if o.view is not None and gradient == SHOWN]
-            show([o.row for o in done], views, None if no_store or lost else store)
+            show([o.row for o in done], views, None if lost else kept)
         said, failed = files.write(done)
         for line in said:
             click.echo(line, err=as_json)

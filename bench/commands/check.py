@@ -9,25 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import (
-    at_option,
-    debug_option,
-    linear_solver_option,
-    max_steps_option,
-    newton_option,
-    no_store_option,
-    rtol_option,
-    solver_of,
-    store_option,
-)
-from bench.commands.studying import no_plot_option, now, one_problem
-from bench.commands.verdict import built, conclude, one_route, writable
+from bench.commands.shared import at_option, debug_option, solver_options, store_options
+from bench.commands.studying import no_plot_option, now, one_problem, writable
+from bench.commands.verdict import built, conclude, one_route, page_writable
 from problems.errors import InputError
 
 if TYPE_CHECKING:
     from bench.checking.subject import Subject
-    from routes.factorization import LinearSolver
-    from routes.newton import Newton, Solver
+    from routes.newton import Solver
 
 ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
 
@@ -41,16 +30,12 @@ ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too 
 @at_option
 @click.option("--budget", type=float, default=200.0, show_default=True, help="Objective calls at most.")
 @click.option("--accept", type=float, default=0.0, metavar="ERROR", help=ACCEPT)
-@rtol_option
-@max_steps_option
-@linear_solver_option
-@newton_option
+@solver_options
 @click.option("--seed", type=int, default=0, show_default=True, help="Of random directions.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
 @click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
 @no_plot_option
-@store_option
-@no_store_option
+@store_options
 @debug_option
 def check(
     target: str | None,
@@ -61,16 +46,12 @@ def check(
     at: str,
     budget: float,
     accept: float,
-    rtol: float,
-    max_steps: int,
-    linear_solver: LinearSolver,
-    newton: Newton,
+    solver: Solver,
     seed: int,
     as_json: bool,
     html: Path | None,
     no_plot: bool,
-    store: Path,
-    no_store: bool,
+    kept: Path | None,
 ) -> None:
     """Is this gradient right, and if not, why?
 
@@ -89,7 +70,7 @@ def check(
 
     if not 0 <= accept < 1:
         raise InputError(f"--accept {accept:g} - give a relative error >= 0 and < 1")
-    solver, kept, started = solver_of(rtol, max_steps, linear_solver, newton), None if no_store else store, now()
+    started = now()
     ways = {"a target": target, "--objective": objective or gradient, "--problem or --route": problem or route}
     given = [name for name, value in ways.items() if value is not None]
     if len(given) != 1:
@@ -99,10 +80,11 @@ def check(
         sys.exit(_contract(problem, route, at, solver, as_json))
     plan = Plan(budget=budget, seed=seed)
     subject = _subject(target, objective, gradient, problem, route, at, solver)
-    writable(html, kept)
+    page_writable(html, kept)
+    writable(kept)
     found = check_subject(subject, plan, accept)
     named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
-    sys.exit(conclude(found, named, started, as_json=as_json, no_plot=no_plot, html=html, store=kept))
+    sys.exit(conclude(found, named, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept))
 
 
 def _subject(

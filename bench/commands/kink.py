@@ -8,21 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import (
-    SELECTOR,
-    at_option,
-    complain,
-    debug_option,
-    linear_solver_option,
-    max_steps_option,
-    newton_option,
-    no_store_option,
-    rtol_option,
-    solver_of,
-    store_option,
-)
-from bench.commands.studying import now, one_problem
-from bench.commands.verdict import built, writable
+from bench.commands.shared import SELECTOR, at_option, checked, complain, debug_option, solver_options, store_options
+from bench.commands.studying import keep, no_plot_option, now, one_problem, writable
+from bench.commands.verdict import built
 from problems.errors import InputError, NotConverged, SingularMatrix
 
 if TYPE_CHECKING:
@@ -30,8 +18,7 @@ if TYPE_CHECKING:
     from bench.studies.event import Kink
     from bench.studies.ray import Ray
     from bench.studies.rounding import Trade
-    from routes.factorization import LinearSolver
-    from routes.newton import Newton
+    from routes.newton import Solver
 
 RANGE = "Least and largest common factor on all moduli."
 BUDGET = "Skip routes whose gradients are predicted to take more seconds; inf forces them."
@@ -44,14 +31,10 @@ BUDGET = "Skip routes whose gradients are predicted to take more seconds; inf fo
 @click.option("--range", "s_range", nargs=2, type=float, default=(0.25, 4.0), show_default=True, help=RANGE)
 @click.option("--points", type=int, default=33, show_default=True, help="Factors in that range.")
 @click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
-@rtol_option
-@max_steps_option
-@linear_solver_option
-@newton_option
-@click.option("--no-plot", is_flag=True, help="Tables only.")
+@solver_options
+@no_plot_option
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
-@store_option
-@no_store_option
+@store_options
 @debug_option
 def kink(
     problem: str,
@@ -60,14 +43,10 @@ def kink(
     s_range: tuple[float, float],
     points: int,
     budget: float,
-    rtol: float,
-    max_steps: int,
-    linear_solver: LinearSolver,
-    newton: Newton,
+    solver: Solver,
     no_plot: bool,
     as_json: bool,
-    store: Path,
-    no_store: bool,
+    kept: Path | None,
 ) -> None:
     """Sweep a common factor s on all moduli over the event where the active set changes; look at both sides of it.
 
@@ -84,7 +63,6 @@ def kink(
 
     from bench import case
     from bench.rows import as_json as json_line
-    from bench.store import Store
     from bench.studies.kink_rows import rows
     from bench.studies.ray import Ray
 
@@ -93,14 +71,12 @@ def kink(
         raise InputError(f"--range {low:g} {high:g} - give two factors, 0 < least < largest")
     if points < 2:
         raise InputError(f"--points {points} - give at least 2")
-    if not budget > 0:
-        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
-    kept, started = None if no_store else store, now()
-    solver, specs = solver_of(rtol, max_steps, linear_solver, newton), case.routes(routes or ["all"])
+    checked(budget)
+    started, specs = now(), case.routes(routes or ["all"])
     for left_out in case.left_out([], routes or ["all"]):
         complain(f"left out of 'all': {left_out}")
     made, p = built(one_problem(problem), at)
-    writable(None, kept)
+    writable(kept)
     ray = Ray(made, p, solver)
     try:
         with np.errstate(all="ignore"):
@@ -108,19 +84,12 @@ def kink(
     except (NotConverged, SingularMatrix) as failure:
         raise InputError(f"kink: {failure}") from failure
     found = rows(swept, traded, {"problem": problem, "at": at})
-    lost = None
-    try:
-        if kept is not None:
-            Store(kept).append_study({"kink": found}, started)
-    except InputError as error:
-        lost = str(error)
     if as_json:
         for row in found:
             click.echo(json_line(row))
     else:
-        _show(swept, traded, problem, not no_plot, None if lost else kept)
-    if lost is not None:
-        complain(f"not kept: {lost}")
+        _show(swept, traded, problem, not no_plot)
+    keep(kept, {"kink": found}, started, quiet=as_json)
     if swept is not None and swept.failed:
         sys.exit(1)
 
@@ -150,7 +119,7 @@ def _measured(
     return swept, trade(ray, stop, spec, s[0], s[-1])
 
 
-def _show(swept: Kink | None, traded: Trade | None, problem: str, plots: bool, kept: Path | None) -> None:
+def _show(swept: Kink | None, traded: Trade | None, problem: str, plots: bool) -> None:
     from bench.views.kink import show_kink, show_trade
     from bench.views.tables import console
 
@@ -159,5 +128,3 @@ def _show(swept: Kink | None, traded: Trade | None, problem: str, plots: bool, k
         show_kink(out, swept, problem, plots)
     if traded is not None:
         show_trade(out, traded, problem)
-    if kept is not None:
-        out.print(f"kept in {kept}", style="dim", soft_wrap=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,7 +14,7 @@ from problems.errors import InputError
 
 if TYPE_CHECKING:
     from routes.factorization import LinearSolver
-    from routes.newton import Newton, Solver
+    from routes.newton import Newton
 
 STORE = Path("results") / "routes.sqlite"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
@@ -41,13 +43,38 @@ newton_option = click.option(
 )
 
 
-def solver_of(rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton) -> Solver:
-    """The forward solver the options ask for. Raises InputError."""
-    from routes.newton import Solver
+Command = Callable[..., Any]
 
-    if not 0 < rtol < 1 or max_steps < 1:
-        raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
-    return Solver(rtol, max_steps, linear_solver, newton)
+
+def solver_options(command: Command) -> Command:
+    """Options of the forward solve; the command gets them as one `solver`. Raises InputError."""
+
+    @wraps(command)
+    def with_solver(*, rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton, **others: Any) -> Any:
+        from routes.newton import Solver
+
+        if not 0 < rtol < 1 or max_steps < 1:
+            raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
+        return command(solver=Solver(rtol, max_steps, linear_solver, newton), **others)
+
+    return rtol_option(max_steps_option(linear_solver_option(newton_option(with_solver))))
+
+
+def store_options(command: Command) -> Command:
+    """--store and --no-store; the command gets the file, or None, as `kept`."""
+
+    @wraps(command)
+    def with_store(*, store: Path, no_store: bool, **others: Any) -> Any:
+        return command(kept=None if no_store else store, **others)
+
+    return store_option(no_store_option(with_store))
+
+
+def checked(budget: float) -> float:
+    """A budget in seconds. Raises InputError."""
+    if not budget > 0:
+        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
+    return budget
 
 
 def complain(what: str) -> None:

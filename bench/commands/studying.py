@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bench.commands.shared import complain
 from problems.errors import InputError
 
 if TYPE_CHECKING:
     from bench.case import ProblemSpec
     from bench.rows import Row
-    from bench.store import Store
 
 PROBLEM = "NAME or 'NAME[key=value]': one problem."
 BUDGET = "Skip what is predicted to take more seconds; inf forces it."
@@ -35,21 +35,12 @@ def one_problem(selector: str) -> ProblemSpec:
     return specs[0]
 
 
-def checked(budget: float) -> float:
-    if not budget > 0:
-        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
-    return budget
-
-
-def writable(store: Path, no_store: bool) -> Store | None:
-    """The store, tried before anything is measured. Raises InputError."""
-    if no_store:
-        return None
+def writable(kept: Path | None) -> None:
+    """Raise InputError now rather than after all is measured."""
     from bench.store import Store
 
-    kept = Store(store)
-    kept.check_writable()
-    return kept
+    if kept is not None:
+        Store(kept).check_writable()
 
 
 def now() -> str:
@@ -65,10 +56,18 @@ def echo_json(tables: Mapping[str, Sequence[Row]]) -> None:
             click.echo(as_json({"table": name, **row}))
 
 
-def keep(store: Store | None, tables: Mapping[str, Sequence[Row]], started: str, quiet: bool) -> None:
-    if store is not None:
-        store.append_study(tables, started)
-        if not quiet:
-            from bench.views.tables import console
+def keep(kept: Path | None, tables: Mapping[str, Sequence[Row]], started: str, quiet: bool) -> None:
+    """Rows of a study into the store, and a line that says so, or that they are lost."""
+    from bench.store import Store
 
-            console().print(f"kept in {store.path}", style="dim", soft_wrap=True)
+    if kept is None:
+        return
+    try:
+        Store(kept).append_study(tables, started)
+    except InputError as error:
+        complain(f"not kept: {error}")
+        return
+    if not quiet:
+        from bench.views.tables import console
+
+        console().print(f"kept in {kept}", style="dim", soft_wrap=True)

@@ -11,14 +11,13 @@ from bench.commands.shared import (
     LINEAR_SOLVERS,
     SELECTOR,
     at_option,
+    checked,
     complain,
     debug_option,
-    no_store_option,
-    store_option,
+    store_options,
 )
 from bench.commands.studying import (
     budget_option,
-    checked,
     echo_json,
     json_option,
     keep,
@@ -56,8 +55,7 @@ TIGHT = 1e-12
 @budget_option
 @no_plot_option
 @json_option
-@store_option
-@no_store_option
+@store_options
 @debug_option
 def tolerance(
     selector: str,
@@ -73,8 +71,7 @@ def tolerance(
     budget: float,
     no_plot: bool,
     as_json: bool,
-    store: Path,
-    no_store: bool,
+    kept: Path | None,
 ) -> None:
     """How wrong a gradient is where the solves are loose: every route at every tolerance, achieved residuals beside.
 
@@ -87,7 +84,8 @@ def tolerance(
 
     problem, specs = one_problem(selector), case.routes(routes)
     tolerances = swept(study.decades(loosest, tightest, per_decade), sweep, rtol, adjoint_rtol)
-    kept, started = writable(store, no_store), now()
+    writable(kept)
+    started = now()
     for left_out in case.left_out([], routes):
         complain(f"left out of 'all': {left_out}")
     done = study.tolerance(problem, specs, tolerances, at, linear_solver, checked(budget))

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
-from bench.commands.shared import at_option, debug_option, no_store_option, store_option
+from bench.commands.shared import at_option, checked, debug_option, store_options
 from bench.commands.studying import (
     budget_option,
-    checked,
     echo_json,
     json_option,
     keep,
@@ -35,8 +34,7 @@ WITHIN = "Errors of implicit-ad that the gradient may have to have met it."
 @budget_option
 @no_plot_option
 @json_option
-@store_option
-@no_store_option
+@store_options
 @debug_option
 def unrolling(
     selector: str,
@@ -48,8 +46,7 @@ def unrolling(
     budget: float,
     no_plot: bool,
     as_json: bool,
-    store: Path,
-    no_store: bool,
+    kept: Path | None,
 ) -> None:
     """What unrolled AD takes to be right: errors of J and its gradient, and bytes of tape, against k iterations.
 
@@ -59,7 +56,8 @@ def unrolling(
     from bench.views import unrolling as view
 
     problem = one_problem(selector)
-    kept, started = writable(store, no_store), now()
+    writable(kept)
+    started = now()
     done = study.unrolling(problem, at, inner, checkpoint, max_iterations, within, checked(budget))
     if as_json:
         echo_json(done.tables)

@@ -8,25 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import (
-    at_option,
-    debug_option,
-    linear_solver_option,
-    max_steps_option,
-    newton_option,
-    no_store_option,
-    rtol_option,
-    solver_of,
-    store_option,
-)
-from bench.commands.studying import no_plot_option, now, one_problem
-from bench.commands.verdict import built, conclude, one_route, writable
+from bench.commands.shared import at_option, checked, debug_option, solver_options, store_options
+from bench.commands.studying import no_plot_option, now, one_problem, writable
+from bench.commands.verdict import built, conclude, one_route, page_writable
 from problems.errors import InputError
 
 if TYPE_CHECKING:
     from problems.problem import Problem
-    from routes.factorization import LinearSolver
-    from routes.newton import Newton
+    from routes.newton import Solver
 
 FEW = 3  # components, where nobody says how many
 COMPONENTS = "So many components by sensitivity, or these: 2,5..7 [element min(3, M) of the bar; 3 elsewhere]."
@@ -42,16 +31,12 @@ BUDGET = "Refuse what is predicted to take more seconds; inf forces it."
 @click.option("--steps", nargs=2, type=float, default=(1e-16, 1.0), show_default=True, help="Least and largest h.")
 @click.option("--per-decade", type=int, default=4, show_default=True, help="Steps in each decade.")
 @click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
-@rtol_option
-@max_steps_option
-@linear_solver_option
-@newton_option
+@solver_options
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the directions.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
 @click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
 @no_plot_option
-@store_option
-@no_store_option
+@store_options
 @debug_option
 def vcurve(
     problem: str,
@@ -62,16 +47,12 @@ def vcurve(
     steps: tuple[float, float],
     per_decade: int,
     budget: float,
-    rtol: float,
-    max_steps: int,
-    linear_solver: LinearSolver,
-    newton: Newton,
+    solver: Solver,
     seed: int,
     as_json: bool,
     html: Path | None,
     no_plot: bool,
-    store: Path,
-    no_store: bool,
+    kept: Path | None,
 ) -> None:
     """Sweep finite-difference steps over decades, read the curve and say whether the gradient is right.
 
@@ -85,19 +66,18 @@ def vcurve(
     from bench.checking.plan import Plan
     from bench.checking.registered import subject
 
-    if not budget > 0:
-        raise InputError(f"--budget {budget:g} - give seconds > 0, or inf")
-    kept, started = None if no_store else store, now()
-    spec, route_spec, solver = one_problem(problem), one_route(route), solver_of(rtol, max_steps, linear_solver, newton)
-    made, p = built(spec, at)
+    checked(budget)
+    started, route_spec = now(), one_route(route)
+    made, p = built(one_problem(problem), at)
     few = _default(made) if components is None else _components(components, len(p))
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     looked_at = subject(made, route_spec.route, route_spec.options, p, solver)
     _refuse_beyond(budget, price_of(lambda: looked_at.objective(p))[0], plan)
-    writable(html, kept)
+    page_writable(html, kept)
+    writable(kept)
     found = check(looked_at, plan)
     what = {"problem": problem, "route": route, "at": at}
-    sys.exit(conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, store=kept))
+    sys.exit(conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept))
 
 
 def _default(problem: Problem) -> int | tuple[int, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bench.commands.shared import complain
+from bench.commands.studying import keep
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,56 +39,12 @@ def built(spec: ProblemSpec, at: str) -> tuple[Problem, Array]:
     return problem, case.point(problem, at)
 
 
-def writable(html: Path | None, store: Path | None) -> None:
+def page_writable(html: Path | None, kept: Path | None) -> None:
     """Raise InputError now rather than after all is measured."""
     from bench.files import check_writable
-    from bench.store import Store
 
     if html is not None:
-        check_writable("--html", html, [] if store is None else [store])
-    if store is not None:
-        Store(store).check_writable()
-
-
-def keep(check: Check, what: dict[str, Any], store: Path | None, started: str) -> str | None:
-    """Rows of the check into the store; a sentence where they are lost."""
-    from bench.checking.rows import rows
-    from bench.store import Store
-
-    if store is None:
-        return None
-    try:
-        Store(store).append_study(rows(check, what), started)
-    except InputError as error:
-        return str(error)
-    return None
-
-
-def finish(check: Check, as_json: bool, no_plot: bool, html: Path | None, kept: Path | None) -> None:
-    """Write the page, then print the verdict, or one JSON object: a closed pipe loses no file."""
-    from bench.rows import clean
-
-    if html is not None:
-        _write_page(check, html)
-    if as_json:
-        click.echo(json.dumps(clean(check.as_dict()), allow_nan=False))
-    else:
-        from bench.views.tables import console
-        from bench.views.verdict import show_check
-
-        out = console()
-        show_check(out, check, curves=not no_plot)
-        for what in ([] if kept is None else [f"kept in {kept}"]) + ([] if html is None else [f"page in {html}"]):
-            out.print(what, style="dim", soft_wrap=True)
-
-
-def _write_page(check: Check, html: Path) -> None:
-    from bench.views.page import page
-
-    try:
-        html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        complain(f"--html {html}: {error.strerror or error} - name a file you may write")
+        check_writable("--html", html, [] if kept is None else [kept])
 
 
 def conclude(
@@ -98,11 +55,34 @@ def conclude(
     as_json: bool,
     no_plot: bool,
     html: Path | None,
-    store: Path | None,
+    kept: Path | None,
 ) -> int:
-    """Keep, show, and the exit code: what could not be kept is said after what was found."""
-    lost = keep(check, what, store, started)
-    finish(check, as_json, no_plot, html, None if lost else store)
-    if lost is not None:
-        complain(f"not kept: {lost}")
+    """Write the page, print the verdict or one JSON object, keep the rows; the exit code.
+
+    The page first: a closed pipe loses no file.
+    """
+    from bench.checking.rows import rows
+    from bench.rows import clean
+
+    if html is not None:
+        _write_page(check, html)
+    if as_json:
+        click.echo(json.dumps(clean(check.as_dict()), allow_nan=False))
+    else:
+        from bench.views.tables import console
+        from bench.views.verdict import show_check
+
+        show_check(console(), check, curves=not no_plot)
+    keep(kept, rows(check, what), started, quiet=as_json)
+    if html is not None:
+        click.echo(f"page in {html}", err=as_json)
     return check.exit_code
+
+
+def _write_page(check: Check, html: Path) -> None:
+    from bench.views.page import page
+
+    try:
+        html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        complain(f"--html {html}: {error.strerror or error} - name a file you may write")

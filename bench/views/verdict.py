@@ -55,7 +55,7 @@ def lines(check: Check) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     table.add_column("line", overflow="fold", min_width=12)
     table.add_column("says", no_wrap=True)
-    names = ("off by", "known to", "slope 1-sided", "slope central", "floor", "best step", "decades")
+    names = ("off by", "known to", "slope 1-sided", "central", "round-off", "floor", "best step", "decades")
     for name in names:
         table.add_column(name, justify="right", no_wrap=name != "decades")
     table.add_column("relative to", overflow="fold")
@@ -76,6 +76,7 @@ def _cells(name: str, reading: Reading) -> list[Text]:
         number(reading.known_to, 2) if known else "",
         number(reading.one_sided.slope, 3),
         number(reading.central.slope, 3),
+        number(curve.roundoff, 2),
         number(curve.floor, 2),
         number(curve.best_step, 2),
         number(curve.window, 2),
