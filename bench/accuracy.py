@@ -95,7 +95,7 @@ class Judges:
             J, gradient, *_ = route.prepare(self.model, self.p)(self.p)
             if self._another_state(J):
                 return f"{route.name}: has found another state, J = {J:.6g} and not {self._J:.6g}"
-            sizes = np.maximum(np.abs(self.p), problem.parameters.scale)
+            sizes = problem.parameters.natural(self.p)
             return self._sound(Reference(route.name, gradient, self._size(gradient, 1.0 / sizes)), self.p.shape)
         few = directions(problem, self.p, DIRECTIONS, SEED)
         slopes = self._slopes(route, few)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from bench.foreign_output import stdout_to_stderr
 from bench.suggest import did_you_mean
 from problems.errors import InputError
 
@@ -39,31 +43,32 @@ def _module(where: str, text: str) -> ModuleType:
         return _loaded(lambda: importlib.import_module(where), text)
     if not path.is_file():
         raise InputError(f"'{text}': no file {where} here - check the path")
-    name = f"_routes_{path.stem}"
+    return _loaded(lambda: _of_file(path.resolve()), text)
+
+
+@cache
+def _of_file(path: Path) -> ModuleType:
+    """The module of a file, run once however often it is named."""
+    name = f"_routes_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    loader = spec.loader
-
-    def load() -> ModuleType:
-        sys.modules[name] = module  # dataclasses and pickles look themselves up there
-        loader.exec_module(module)
-        return module
-
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)  # what stands beside the file can be imported by it
-    return _loaded(load, text)
-
-
-def _loaded(load: Any, text: str) -> ModuleType:
-    from contextlib import redirect_stdout
-
+    sys.modules[name] = module  # dataclasses and pickles look themselves up there
+    if str(path.parent) not in sys.path:
+        sys.path.insert(0, str(path.parent))  # what stands beside the file can be imported by it
     try:
-        with redirect_stdout(sys.stderr):
-            module: ModuleType = load()
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _loaded(load: Callable[[], ModuleType], text: str) -> ModuleType:
+    try:
+        with stdout_to_stderr():
+            return load()
     except (Exception, SystemExit) as error:  # code of others may raise anything while it is imported
         said = " ".join(str(error).split())
         raise InputError(f"'{text}' cannot be imported: {type(error).__name__}: {said} - mend it") from error
-    return module

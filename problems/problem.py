@@ -95,6 +95,10 @@ class Parameters:
     def __len__(self) -> int:
         return len(self.start)
 
+    def natural(self, p: Array) -> Array:
+        """max(|p_i|, scale_i), (n_p,): the change of each component that a relative step of 1 stands for."""
+        return np.asarray(np.maximum(np.abs(p), self.scale))
+
     def bounds(self, i: int) -> tuple[float, float]:
         """The open interval of component i."""
         lower, upper = (np.broadcast_to(bound, self.start.shape)[i] for bound in (self.lower, self.upper))

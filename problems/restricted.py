@@ -185,7 +185,7 @@ def directions(problem: Problem, p: Array, m: int, seed: int) -> Restricted:
     of = problem.parameters
     rng = np.random.default_rng(seed)
     xi = rng.choice([-1.0, 1.0], (m, len(p))) * rng.uniform(0.5, 1.5, (m, len(p)))
-    V = (xi * np.maximum(np.abs(p), of.scale)).T
+    V = (xi * of.natural(p)).T
     lower, upper = _room(p, V, of)
     return Restricted(
         problem,

@@ -85,7 +85,7 @@ def steps(parameters: Parameters, p: Array, relative: float, who: str, sides: tu
 
     Raises DomainError for a step that leaves the domain or vanishes.
     """
-    h: Array = (p + relative * np.maximum(np.abs(p), parameters.scale)) - p
+    h: Array = (p + relative * parameters.natural(p)) - p
     for side in sides:
         q = p + side * h
         bad = np.flatnonzero((q <= parameters.lower) | (q >= parameters.upper))

@@ -10,7 +10,6 @@ from bench.checking.check import check as check_subject
 from bench.checking.foreign import Bounds
 from bench.checking.plan import Plan
 from bench.checking.result import Check
-from bench.checking.subject import Subject
 from problems.errors import InputError
 
 
@@ -46,46 +45,35 @@ def check(
     """
     plan = Plan(budget=budget, seed=seed)
     if gradient is None:
-        subject = foreign.subject_of(objective, name or type(objective).__name__, start)
-        if scale is not None or bounds is not None or names is not None:
-            raise InputError("check: an object has its own scale, bounds and names - set them there")
-    else:
-        if start is None:
-            raise InputError("check: no start - give the point p to check at")
-        tightened = None if tighten is None else _tightened(tighten, start, scale, bounds, names)
-        subject = foreign.subject(
-            objective,
-            gradient,
-            start,
-            name=name or "the gradient",
-            scale=scale,
-            bounds=bounds,
-            names=names,
-            tighten=tightened,
-            active_set=active_set,
-        )
+        given = {"scale": scale, "bounds": bounds, "names": names, "tighten": tighten, "active_set": active_set}
+        own = [key for key, value in given.items() if value is not None]
+        if own:
+            raise InputError(f"check: an object brings its own {own[0]} - make it an attribute")
+        return check_subject(foreign.subject_of(objective, name or type(objective).__name__, start), plan, accept)
+    if start is None:
+        raise InputError("check: no start - give the point p to check at")
+    subject = foreign.subject(
+        objective,
+        gradient,
+        start,
+        name=name or "the gradient",
+        scale=scale,
+        bounds=bounds,
+        names=names,
+        tighten=tighten,
+        active_set=active_set,
+    )
     return check_subject(subject, plan, accept)
 
 
-def _tightened(
-    tighten: Callable[[float], Any], start: Any, scale: Any, bounds: Bounds | None, names: Sequence[str] | None
-) -> Callable[[float], Subject]:
-    def again(factor: float) -> Subject:
-        made = tighten(factor)
-        if not isinstance(made, tuple):
-            return foreign.subject_of(made, "tightened", start)
-        J, g = made
-        return foreign.subject(J, g, start, name="tightened", scale=scale, bounds=bounds, names=names)
-
-    return again
-
-
-def assert_gradient(objective: Any, gradient: Callable[..., Any] | None = None, start: Any = None, **more: Any) -> None:
-    """Raise AssertionError unless `check` of the same arguments says that the gradient agrees.
+def assert_gradient(
+    objective: Any, gradient: Callable[..., Any] | None = None, start: Any = None, **keywords: Any
+) -> None:
+    """Raise AssertionError unless `check` of the same arguments, keywords included, says that the gradient agrees.
 
     def test_my_gradient():
-        assert_gradient(J, dJ, start=np.ones(3))
+        assert_gradient(J, dJ, start=np.ones(3), budget=100)
     """
-    found = check(objective, gradient, start, **more)
+    found = check(objective, gradient, start, **keywords)
     if found.verdict != "agrees":
         raise AssertionError(f"{found.name}: {found.verdict}: {found.says} - {found.todo}")

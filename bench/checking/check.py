@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
 
 import numpy as np
@@ -18,18 +21,27 @@ from bench.checking.reading import Reading
 from bench.checking.result import Check, Refined
 from bench.checking.subject import Subject
 from bench.checking.words import on_agreement, on_kink, on_noise, on_plateau, on_unusable, remarks, undetermined
-from problems.errors import RoutesError
+from problems.errors import InputError
 
 BY_FAR = 1e-2
 MANY = 3  # right components for every wrong one
 SMALL = 1e-2  # a plateau below may be a loosely solved J: solvers are seldom looser
+CLEARLY = 0.1  # error of a component, relative to itself, that no solver is loose enough for
 
 
 def check(subject: Subject, plan: Plan, accepted: float = 0.0) -> Check:
-    """Is subject's gradient right? Never raises for what the subject does.
+    """Is subject's gradient right? Never raises for what the subject does; what it prints goes to stderr.
 
-    accepted: a relative error up to which the gradient need not be better (1e-7 at least).
+    accepted: a relative error, >= 0 and < 1, up to which the gradient need not be better (1e-7 at least). Raises
+    InputError.
     """
+    if not 0.0 <= accepted < 1.0:
+        raise InputError(f"check: an accepted error of {accepted:g} - give a relative error >= 0 and < 1")
+    with redirect_stdout(sys.stderr):
+        return _checked(subject, plan, accepted)
+
+
+def _checked(subject: Subject, plan: Plan, accepted: float) -> Check:
     J = Guarded(subject.objective, Account(plan.budget))
     blank = Check(subject.name, "undetermined", "", "")
     try:
@@ -49,18 +61,18 @@ def _counted(found: Check, J: Guarded) -> Check:
 
 
 def _judged(so_far: Check, seen: Examination) -> Check:
-    """The verdict, by the worst that any line says."""
+    """The verdict, by the worst that any line says; nothing agrees where no random direction does."""
     by = {says: [r for r in seen.readings if r.says == says] for says in ("kink", "plateau", "agrees", "noise")}
-    findings = tuple(evidence(seen))
-    so_far = replace(so_far, findings=findings)
+    so_far = replace(so_far, findings=tuple(evidence(seen)))
     if by["kink"]:
-        return on_kink(replace(so_far, deciding=max(by["kink"], key=lambda r: r.kink or 0.0)))
+        return on_kink(replace(so_far, deciding=max(by["kink"], key=lambda r: r.kink or 0.0)), by["plateau"])
     if by["plateau"]:
-        return _on_plateau(so_far, seen, _worst(by["plateau"]), findings)
-    if by["agrees"]:
-        return on_agreement(replace(so_far, deciding=_clearest(by["agrees"])), by["noise"])
-    if by["noise"]:
-        return _on_noise(replace(so_far, deciding=_clearest(by["noise"])), seen)
+        return _on_plateau(so_far, seen, _worst(by["plateau"]))
+    whole = [r for r in by["agrees"] if r.sweep.line.index is None or len(seen.subject.p) == 1]
+    if whole:
+        return on_agreement(replace(so_far, deciding=_widest(whole)), by["noise"])
+    if by["noise"] or by["agrees"]:
+        return _on_noise(replace(so_far, deciding=_widest(by["noise"] or by["agrees"])), seen)
     return undetermined(so_far, "no line has three steps at which J is known", "mend J near p, or its bounds")
 
 
@@ -70,39 +82,46 @@ def _worst(readings: list[Reading]) -> Reading:
     Along random directions an error is one of the whole gradient.
     """
     worst = max(readings, key=lambda r: r.off)
-    whole = [r for r in readings if r.sweep.probe.index is None and r.off > BY_FAR * worst.off]
+    whole = [r for r in readings if r.sweep.line.index is None and r.off > BY_FAR * worst.off]
     return max(whole, key=lambda r: (len(r.sweep.h), r.off)) if whole else worst
 
 
-def _clearest(readings: list[Reading]) -> Reading:
-    """The first line of all steps has the fullest curve."""
-    return max(readings, key=lambda r: (len(r.sweep.h), -r.known_to))
+def _widest(readings: list[Reading]) -> Reading:
+    """Of the lines swept most widely, whose curves are fullest, the one that knows least."""
+    return max(readings, key=lambda r: (len(r.sweep.h), r.known_to))
 
 
 def _on_noise(so_far: Check, seen: Examination) -> Check:
     """Noise that falls with the forward tolerance is the solver's."""
     assert so_far.deciding is not None
-    tightened = tuple(settle.tighten(seen, so_far.deciding)) if seen.subject.tighten is not None else ()
-    return on_noise(replace(so_far, tightened=tightened))
+    if seen.subject.tighten is None:
+        return on_noise(so_far)
+    tightened, ended = settle.tighten(seen, so_far.deciding)
+    return on_noise(replace(so_far, tightened=tightened, not_done=() if ended is None else (ended,)))
 
 
-def _on_plateau(so_far: Check, seen: Examination, worst: Reading, findings: tuple[Finding, ...]) -> Check:
+def _on_plateau(so_far: Check, seen: Examination, worst: Reading) -> Check:
     """A plateau that falls with the forward tolerance is the solver's, one that shrinks with h the discretization's."""
-    tightened = tuple(settle.tighten(seen, worst)) if seen.subject.tighten is not None else ()
-    so_far = replace(so_far, deciding=worst, tightened=tightened)
-    convicted = next((f for f in findings if f.culprit is not None), None)
-    if tightened and settle.fell(worst, tightened[-1].reading):
-        return on_plateau(replace(so_far, culprit=None if convicted is None else convicted.culprit), "solver-limited")
-    by_mesh = convicted is None or convicted.by_mesh
-    refined, why_not = _refined(seen, worst) if by_mesh else (None, ())
-    located = _located(seen, seen.readings)
+    so_far = replace(so_far, deciding=worst)
+    ended = None
+    if seen.subject.tighten is not None:
+        tightened, ended = settle.tighten(seen, worst)
+        so_far = replace(so_far, tightened=tightened, not_done=() if ended is None else (ended,))
+    convicted = next((f for f in so_far.findings if f.culprit is not None), None)
     culprit = None if convicted is None else convicted.culprit
-    so_far = replace(so_far, located=located, refined=refined, culprit=culprit, findings=(*findings, *why_not))
+    if so_far.tightened and settle.fell(worst, so_far.tightened[-1].reading):
+        return on_plateau(replace(so_far, culprit=culprit), "solver-limited")
+    refined = None
+    if convicted is None or convicted.by_mesh:
+        refined, so_far = _refined(so_far, seen, worst)
+    located = _located(seen, seen.readings)
+    so_far = replace(so_far, located=located, refined=refined, culprit=culprit)
     if refined is not None and refined.order >= settle.SHRINKS and not _local(located):
         return on_plateau(so_far, "inconsistent-discretization")
-    if convicted is not None:
+    if convicted is not None or _local(located):
         return on_plateau(so_far, "wrong-gradient")
-    if not tightened and worst.off < SMALL and not _local(located):
+    clear = worst.off >= SMALL or any(w.off >= CLEARLY for w in located.worst)
+    if not so_far.tightened and (ended is not None or not clear):
         return on_plateau(so_far, "undetermined")
     return on_plateau(so_far, "wrong-gradient")
 
@@ -114,25 +133,20 @@ def _local(located: Located) -> bool:
 
 def _located(seen: Examination, readings: list[Reading]) -> Located:
     """By halving where a random direction shows the plateau, else among the components looked at."""
-    known = [r for r in readings if r.sweep.probe.index is not None]
-    shown = [r for r in readings if r.sweep.probe.index is None and r.says == "plateau"]
+    known = [r for r in readings if r.sweep.line.index is not None]
+    shown = [r for r in readings if r.sweep.line.index is None and r.says == "plateau"]
     search = None
     if shown:
         search = Search(seen.J, seen.J_0, seen.subject, seen.gradient, _worst(shown), seen.plan.seed + 1)
     return locate(search, known, seen.subject)
 
 
-def _refined(seen: Examination, worst: Reading) -> tuple[Refined | None, tuple[Finding, ...]]:
-    """The plateau on a finer mesh, or why it was not looked at there."""
-    assert worst.level is not None
+def _refined(so_far: Check, seen: Examination, worst: Reading) -> tuple[Refined | None, Check]:
+    """What a finer mesh says; why it says nothing, where it does not, is another finding."""
     if seen.subject.refine is None:
-        return None, ()
-    try:
-        other = seen.subject.refine()
-        refined = None if other is None else settle.refine(seen, other, worst.level.h)
-    except RoutesError as failure:
-        return None, (Finding("mesh refinement", float("nan"), settle.SHRINKS, str(failure)),)
-    if refined is None:
-        why = "no finer mesh for this unknown, or too few calls left"
-        return None, (Finding("mesh refinement", float("nan"), settle.SHRINKS, why),)
-    return refined, ()
+        return None, so_far
+    refined = settle.refine(seen, worst)
+    if isinstance(refined, str):
+        why = Finding("mesh refinement", math.nan, settle.SHRINKS, refined)
+        return None, replace(so_far, findings=(*so_far.findings, why))
+    return refined, so_far

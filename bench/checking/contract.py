@@ -14,7 +14,7 @@ from problems.errors import InputError, RoutesError
 from problems.problem import Array, Offers, Problem
 from routes.forward_work import ForwardWork
 from routes.model import Model
-from routes.newton import Solver, State
+from routes.newton import Solver, State, norm
 from routes.route import Route
 from routes.tally import Work
 
@@ -87,8 +87,9 @@ def _parameters(problem: Problem) -> Iterator[Finding]:
 def _nearby(problem: Problem, state: State) -> tuple[Array, Array]:
     """A state and a p close by, where R is not zero and no symmetry of the start hides a term."""
     rng = np.random.default_rng(0)
-    u = state.u * (1.0 + NEARBY * rng.uniform(-1.0, 1.0, len(state.u)))
-    natural = np.maximum(np.abs(state.p), problem.parameters.scale)
+    size = norm(state.u) or 1.0  # where u is zero, and no scale is known, R is looked at near 1
+    u = state.u + NEARBY * size * rng.uniform(-1.0, 1.0, len(state.u))
+    natural = problem.parameters.natural(state.p)
     q = state.p + NEARBY * natural * rng.uniform(-1.0, 1.0, len(state.p))
     inside = (q > problem.parameters.lower) & (q < problem.parameters.upper)
     return u, np.where(inside, q, state.p)

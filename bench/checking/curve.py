@@ -23,7 +23,7 @@ class Curve:
     best_step  relative step there
     slope      of log error over log step on the truncation branch: 1 one-sided, 2 central
     roundoff   the same on the round-off branch: -1
-    window     decades of steps with an error below 1e-3
+    window     decades of steps about the best one with errors below 1e-3
     """
 
     floor: float | None
@@ -44,14 +44,25 @@ def fit(h: Array, error: Array, noise: float) -> Curve:
     expected = np.maximum(medians, noise / middle)  # a lucky zero at a tiny step is no floor
     floor, best = float(expected.min()), float(middle[expected.argmin()])
     branch = (error > CLEAR * floor) & (error > 0.0) & (error < ASYMPTOTIC)
-    useful = np.log10(h[error <= USEFUL])
     return Curve(
         floor,
         best,
         slope(h, error, branch & (h > best)),
         slope(h, error, branch & (h < best)),
-        float(np.ptp(useful)) if useful.size else 0.0,
+        _window(h, error <= USEFUL, int(np.abs(np.log10(h / best)).argmin())),
     )
+
+
+def _window(h: Array, useful: Array, best: int) -> float:
+    """Decades of the run of useful steps about the best one."""
+    if not useful[best]:
+        return 0.0
+    first = last = best
+    while first > 0 and useful[first - 1]:
+        first -= 1
+    while last < len(h) - 1 and useful[last + 1]:
+        last += 1
+    return float(np.log10(h[last] / h[first]))
 
 
 def slope(h: Array, error: Array, branch: Array) -> float | None:

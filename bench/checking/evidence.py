@@ -9,7 +9,7 @@ import numpy as np
 from bench.checking.curve import slope
 from bench.checking.examine import Examination
 from bench.checking.finding import Finding
-from bench.checking.probe import directions
+from bench.checking.line import directions
 from problems.errors import RoutesError
 
 COUNT = 3  # random directions of complex steps

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bench.checking.asked import Asked, ask
 from bench.checking.guarded import Guarded
+from bench.checking.line import Line, Sweep, chosen_components, components, directions, sweep
 from bench.checking.noise import noise
 from bench.checking.plan import Plan
-from bench.checking.probe import Probe, Sweep, chosen_components, components, directions, sweep
 from bench.checking.reading import Reading, stencil_changes
 from bench.checking.subject import Subject
 from problems.problem import Array
@@ -23,7 +23,10 @@ REPEATS = 4  # further evaluations at p, where two differ
 
 @dataclass
 class Examination:
-    """A subject, its gradient, its J with everything known of it, and the readings made so far."""
+    """A subject, its gradient, its J with everything known of it, and the readings made so far.
+
+    repeated   what J(p) was each time; remembers: by how much calls at other points have changed it
+    """
 
     subject: Subject
     plan: Plan
@@ -33,6 +36,7 @@ class Examination:
     repeated: Array
     accepted: float
     readings: list[Reading] = field(default_factory=list)
+    remembers: float = 0.0
 
     @classmethod
     def of(cls, subject: Subject, plan: Plan, J: Guarded, accepted: float = 0.0) -> Examination:
@@ -57,7 +61,7 @@ class Examination:
         """|g w|_2, the slope of J along a random natural change."""
         return float(np.linalg.norm(self.gradient * self.subject.natural))
 
-    def lines(self) -> list[Probe]:
+    def lines(self) -> list[Line]:
         """A random direction first, then components, then the other directions."""
         plan, n_p = self.plan, len(self.subject.p)
         few = plan.components
@@ -67,9 +71,11 @@ class Examination:
             return components(self.subject, [0])
         return [first, *components(self.subject, indices), *others]
 
-    def look(self, lines: Sequence[Probe]) -> None:
-        """Read every line: over all steps, or near the best step of the first."""
+    def look(self, lines: Sequence[Line]) -> None:
+        """Read every line: over all steps, or near the best step of the first. After that, J(p) is asked for again."""
         for k, line in enumerate(lines):
+            if k == 1:
+                self._ask_again()
             best = self.readings[0].level if self.readings else None
             if self.plan.everywhere or k == 0 or best is None:
                 self.readings.append(self.read(line, self.plan.steps))
@@ -77,7 +83,16 @@ class Examination:
             reading = self.read(line, self.plan.near(best.h))
             self.readings.append(self._wider(reading))
 
-    def read(self, line: Probe, h: Array) -> Reading:
+    def _ask_again(self) -> None:
+        """A J that starts where its last call ended tells by now: what it remembers counts as noise."""
+        value = self.J(self.subject.p) if self.J.left() > 2 else self.J_0
+        if value == self.J_0 or not np.isfinite(value) or len(self.repeated) > 2:
+            return
+        self.remembers = abs(value - self.J_0)
+        self.repeated = np.append(self.repeated, value)
+        self.readings = [self._reading(r.sweep) for r in self.readings]
+
+    def read(self, line: Line, h: Array) -> Reading:
         """The sweep of one line, as far as the budget goes."""
         return self._reading(sweep(self.J, self.J_0, self.subject, self.gradient, line, h))
 
@@ -91,15 +106,12 @@ class Examination:
         more = steps[steps < h[0]][-len(h) :] if below else steps[steps > h[-1]][: len(h)]
         if self.J.left() < 2 * len(more):
             return reading
-        extra = sweep(self.J, self.J_0, self.subject, self.gradient, reading.sweep.probe, more)
+        extra = sweep(self.J, self.J_0, self.subject, self.gradient, reading.sweep.line, more)
         return self._reading(reading.sweep.joined(extra))
 
     def _reading(self, made: Sweep) -> Reading:
         alone = len(made.h) < len(self.plan.steps) and self.readings  # few steps tell less of J's noise than all do
-        sigma = self.readings[0].noise if alone else noise(made, self.J.eps, self.repeated)
+        sigma = self.readings[0].noise if alone else max(noise(made, self.J.eps, self.repeated), self.remembers)
         by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
-        reading = Reading(made, sigma, self.size, self.accepted, by_nature)
-        active_set = self.subject.active_set
-        if active_set is None:
-            return reading
-        return replace(reading, changes=stencil_changes(active_set, self.subject.p, made.probe.v))
+        changes = stencil_changes(self.subject, made.line.v)
+        return Reading(made, sigma, self.size, self.accepted, by_nature, changes)

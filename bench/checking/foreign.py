@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from bench.checking.guarded import FOREIGN
 from bench.checking.subject import Subject, natural_scale, vector
 from problems.errors import InputError
 from problems.problem import Array, default_label
 
-OFFERED = ("objective", "gradient", "value_and_gradient", "start")
 Bounds = tuple[Any, Any]
 
 
@@ -21,26 +22,11 @@ def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
     Optional: scale, bounds (lower, upper), names, tighten(factor), active_set(p). `start` overrides the object's.
     A class, or a function that makes the object, is called first. Raises InputError for what is missing.
     """
-    if isinstance(thing, type) or (callable(thing) and not _complete(thing)):
-        thing = _made(thing, name)
-    both = getattr(thing, "value_and_gradient", None)
-    objective, gradient = getattr(thing, "objective", None), getattr(thing, "gradient", None)
-    if callable(both):
-        objective = objective if callable(objective) else (lambda p: both(p)[0])
-        gradient = gradient if callable(gradient) else (lambda p: both(p)[1])
-    if not callable(objective) or not callable(gradient):
-        raise InputError(
-            f"check: {name} has no objective(p) and gradient(p), nor value_and_gradient(p) - it has"
-            f" {', '.join(n for n in dir(thing) if not n.startswith('_')) or 'nothing'}"
-        )
+    thing = _made(thing, name)
+    objective, gradient = functions_of(thing, name)
     given = getattr(thing, "start", None) if start is None else start
     if given is None:
         raise InputError(f"check: {name} has no start - give it one, an array (n_p,), or a point with --at FILE.csv")
-    tighten = getattr(thing, "tighten", None)
-
-    def tightened(factor: float) -> Subject:
-        return subject_of(tighten(factor), name, given) if tighten is not None else subject_of(thing, name, given)
-
     return subject(
         objective,
         gradient,
@@ -49,9 +35,25 @@ def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
         scale=getattr(thing, "scale", None),
         bounds=getattr(thing, "bounds", None),
         names=getattr(thing, "names", None),
-        tighten=tightened if callable(tighten) else None,
+        tighten=getattr(thing, "tighten", None),
         active_set=getattr(thing, "active_set", None),
     )
+
+
+def functions_of(thing: Any, name: str) -> tuple[Callable[[Array], Any], Callable[[Array], Any]]:
+    """objective and gradient of an object. Raises InputError."""
+    both = getattr(thing, "value_and_gradient", None)
+    objective, gradient = getattr(thing, "objective", None), getattr(thing, "gradient", None)
+    if callable(both):
+        objective = objective if callable(objective) else (lambda p: both(p)[0])
+        gradient = gradient if callable(gradient) else (lambda p: both(p)[1])
+    if not callable(objective) or not callable(gradient):
+        known = ", ".join(n for n in dir(thing) if not n.startswith("_")) or "nothing"
+        raise InputError(
+            f"check: {name} has no objective(p) and gradient(p), nor value_and_gradient(p); it has {known}"
+            " - give it one or the other"
+        )
+    return objective, gradient
 
 
 def subject(
@@ -63,10 +65,13 @@ def subject(
     scale: Any = None,
     bounds: Bounds | None = None,
     names: Sequence[str] | None = None,
-    tighten: Callable[[float], Subject] | None = None,
+    tighten: Callable[[float], Any] | None = None,
     active_set: Callable[[Array], Any] | None = None,
 ) -> Subject:
-    """A subject out of plain functions. Raises InputError."""
+    """A subject out of plain functions. Raises InputError.
+
+    tighten(factor) gives (objective, gradient), or an object that has them: the rest stays as it is.
+    """
     p = vector(start, None, "start")
     if not np.isfinite(p).all():
         raise InputError(f"check: start[{int(np.flatnonzero(~np.isfinite(p))[0])}] is not finite - start somewhere")
@@ -84,7 +89,19 @@ def subject(
     if names is not None and len(names) != n_p:
         raise InputError(f"check: {len(names)} names for {n_p} parameters - give one each")
     label = default_label if names is None else (lambda i: str(names[i]))
-    return Subject(name, objective, gradient, p, s, lower, upper, True, label, None, tighten, active_set)
+    made = Subject(name, objective, gradient, p, s, lower, upper, label=label)
+
+    def tightened(factor: float) -> Subject:
+        assert tighten is not None
+        other = tighten(factor)
+        J, g = other if isinstance(other, tuple) else functions_of(_made(other, "tightened"), "tightened")
+        return replace(made, objective=J, gradient=g)
+
+    return replace(
+        made,
+        tighten=tightened if callable(tighten) else None,
+        active_set=active_set if callable(active_set) else None,
+    )
 
 
 def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:
@@ -109,17 +126,17 @@ def _without_none(end: Any, limit: float) -> Any:
     return [limit if e is None else e for e in end] if isinstance(end, list | tuple) else end
 
 
-def _complete(thing: Any) -> bool:
-    return callable(getattr(thing, "gradient", None)) or callable(getattr(thing, "value_and_gradient", None))
-
-
-def _made(make: Callable[[], Any], name: str) -> Any:
+def _made(thing: Any, name: str) -> Any:
+    """The object itself, or what the class or function given makes."""
+    ready = callable(getattr(thing, "gradient", None)) or callable(getattr(thing, "value_and_gradient", None))
+    if not isinstance(thing, type) and (ready or not callable(thing)):
+        return thing
     try:
-        return make()
+        return thing()
     except TypeError as error:
         raise InputError(
             f"check: {name} is a function or class that wants arguments ({error}) - name an object with objective(p),"
             " gradient(p) and start, or give --objective and --gradient"
         ) from error
-    except Exception as error:  # somebody else's code
+    except FOREIGN as error:
         raise InputError(f"check: {name} cannot be made: {type(error).__name__}: {error} - mend it") from error

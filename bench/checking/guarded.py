@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
-from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +13,7 @@ from problems.problem import Array
 
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what code of others may raise
 SINGLE = float(np.finfo(np.float32).eps)
-DISTINCT = 5  # values: fewer may fit into float32 by chance, as whole numbers do
+DISTINCT = 5  # values that are no round numbers, which fit into float16 and tell nothing
 DOUBLE = float(np.finfo(np.float64).eps)
 
 
@@ -44,7 +42,7 @@ class Account:
 class Guarded:
     """objective(p) as a float, NaN where it raises or returns no finite real number.
 
-    It gets a copy of p, so that changing it harms nobody; `mutates` tells of it. What it prints goes to stderr.
+    It gets a copy of p, so that changing it harms nobody; `mutates` tells of it.
     Raises Spent beyond the account's budget.
     """
 
@@ -61,7 +59,7 @@ class Guarded:
         self.account.calls += 1
         given = p.copy()
         try:
-            with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
+            with np.errstate(all="ignore"):
                 value = number(self.objective(given))
         except FOREIGN as failure:
             self._accident(p, f"{type(failure).__name__}: {' '.join(str(failure).split())}")
@@ -70,9 +68,10 @@ class Guarded:
         if not math.isfinite(value):
             self._accident(p, f"J = {value}")
             return math.nan
-        self._single &= abs(value) < 3e38 and float(np.float32(value)) == value
-        if len(self._values) < DISTINCT:
-            self._values.add(value)
+        with np.errstate(over="ignore"):
+            self._single &= float(np.float32(value)) == value
+            if len(self._values) < DISTINCT and float(np.float16(value)) != value:
+                self._values.add(value)
         return value
 
     def sharing(self, objective: Callable[[Array], Any]) -> Guarded:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.checking.guarded import Guarded
+from bench.checking.line import Line, components, sweep
 from bench.checking.plateau import DIFFERENT
-from bench.checking.probe import Probe, components, sweep
 from bench.checking.reading import Reading
 from bench.checking.subject import Subject
 from problems.problem import Array
@@ -41,17 +41,22 @@ class Worst:
 
 @dataclass(frozen=True)
 class Located:
-    """worst components, largest first; right: how many others were then found right; everywhere: many are wrong."""
+    """worst components, largest first, and right, how many others were then found right; 0 where that is not known.
+
+    slope      given / found of the whole gradient along the direction that showed the plateau
+    everywhere more are wrong than were searched for
+    """
 
     worst: tuple[Worst, ...]
     right: int = 0
     everywhere: bool = False
+    slope: float | None = None
 
     @property
     def factor(self) -> float | None:
-        """The one factor that all wrong components are off by, if there is one."""
-        factors = [w.factor for w in self.worst]
-        if len(factors) < 2 or None in factors:
+        """The one factor that the wrong components and the whole gradient are off by, if there is one."""
+        factors = [w.factor for w in self.worst] + [self.slope]
+        if len(factors) < 3 or None in factors:
             return None
         values = np.array(factors, dtype=float)
         middle = float(np.median(values))
@@ -70,12 +75,17 @@ class Search:
         self.rng = np.random.default_rng(seed)
         self.plateau = plateau
 
+    @property
+    def ratio(self) -> float | None:
+        """The slope given / the quotient found, along the whole direction."""
+        return self.plateau.slope / self.plateau.quotient if self.plateau.quotient else None
+
     def off(self, members: Array) -> float:
         """|quotient - slope| along a random direction of these components; two calls."""
         v = np.zeros_like(self.w)
         xi = self.rng.choice([-1.0, 1.0], len(members)) * self.rng.uniform(0.75, 1.25, len(members))
         v[members] = xi * self.w[members]
-        s = sweep(self.J, self.J_0, self.subject, self.gradient, Probe("", v), self.h)
+        s = sweep(self.J, self.J_0, self.subject, self.gradient, Line("", v), self.h)
         off = s.off_central if s.two_sided else s.off_forward
         return float(np.abs(off[0]))
 
@@ -95,8 +105,8 @@ class Search:
         """The component by differences; None where it agrees after all."""
         if self.J.left() < 2 * len(AROUND):
             return None
-        (probe,) = components(self.subject, [i])
-        s = sweep(self.J, self.J_0, self.subject, self.gradient, probe, self.h * AROUND)
+        (line,) = components(self.subject, [i])
+        s = sweep(self.J, self.J_0, self.subject, self.gradient, line, self.h * AROUND)
         like = self.plateau
         reading = Reading(s, like.noise, like.size, like.accepted, like.by_nature)
         return wrong_component(reading, self.subject) if reading.says == "plateau" else None
@@ -110,8 +120,8 @@ def locate(search: Search | None, known: Sequence[Reading], subject: Subject) ->
         return _sorted(worst)
     n_p = len(search.gradient)
     if len(worst) == len(known) >= 3:
-        return _sorted(worst, everywhere=True)
-    looked_at = [r.sweep.probe.index for r in known if r.sweep.probe.index is not None]
+        return _sorted(worst, everywhere=True, slope=search.ratio)
+    looked_at = [r.sweep.line.index for r in known if r.sweep.line.index is not None]
     if len(looked_at) == n_p:
         return _sorted(worst, right=n_p - len(worst))
     for w in worst:
@@ -129,16 +139,16 @@ def locate(search: Search | None, known: Sequence[Reading], subject: Subject) ->
         worst.append(found)
         search.gradient[found.index] = found.found
         others = np.setdiff1d(others, [found.index])
-    return _sorted(worst, everywhere=True)
+    return _sorted(worst, everywhere=True, slope=search.ratio)
 
 
 def wrong_component(reading: Reading, subject: Subject) -> Worst:
-    i, quotient = reading.sweep.probe.index, reading.quotient
+    i, quotient = reading.sweep.line.index, reading.quotient
     assert i is not None
     assert quotient is not None
     w = float(subject.natural[i])
     return Worst(subject.label(i), i, reading.slope / w, quotient / w)
 
 
-def _sorted(worst: list[Worst], right: int = 0, everywhere: bool = False) -> Located:
-    return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), right, everywhere)
+def _sorted(worst: list[Worst], right: int = 0, everywhere: bool = False, slope: float | None = None) -> Located:
+    return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), right, everywhere, slope)

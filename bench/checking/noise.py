@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from bench.checking.probe import Sweep
+from bench.checking.line import Sweep
 from problems.problem import Array
 
 WINDOW = 5  # steps whose median second difference is taken: one dead or lucky point decides nothing

@@ -11,8 +11,10 @@ from typing import Literal
 import numpy as np
 
 from bench.checking.curve import Curve, fit
+from bench.checking.guarded import FOREIGN
+from bench.checking.line import Sweep
 from bench.checking.plateau import DIFFERENT, Level, level
-from bench.checking.probe import Sweep
+from bench.checking.subject import Subject
 from problems.problem import Array
 
 Says = Literal["agrees", "plateau", "kink", "noise", "nothing"]
@@ -67,7 +69,7 @@ class Reading:
         """
         own = abs(self.slope) if self.quotient is None else max(abs(self.slope), abs(self.quotient))
         known = self.level is not None and self.level.uncertainty <= RESOLVED * own
-        if known and self.sweep.probe.index is not None:
+        if known and self.sweep.line.index is not None:
             return own
         whole, J = max(self.size, own), abs(self.sweep.J)
         return whole if whole > ZERO * J else J
@@ -75,7 +77,7 @@ class Reading:
     @property
     def own_scale(self) -> bool:
         """Whether that is a component's own slope."""
-        return self.sweep.probe.index is not None and self.scale < self.size
+        return self.sweep.line.index is not None and self.scale < self.size
 
     @property
     def off(self) -> float:
@@ -90,14 +92,30 @@ class Reading:
         return self.level.uncertainty / self.scale if self.scale else 0.0
 
     @cached_property
-    def kink(self) -> float | None:
-        """The jump between one-sided slopes, relative; None where there is none."""
+    def _jump(self) -> Level | None:
+        """Between one-sided slopes, where it is one; None where J is smooth as far as quotients tell."""
         if not self.sweep.two_sided:
             return None
         found = level(self.sweep.h, self.sweep.jump, np.sqrt(6.0) * self.noise, RESOLVED * self.size)
         if found is None or abs(found.value) <= max(DIFFERENT * found.uncertainty, TINY * self.scale):
             return None
-        return abs(found.value) / self.scale
+        return found
+
+    @property
+    def kink(self) -> float | None:
+        """That jump, relative to the slopes; None where there is none."""
+        if self._jump is None:
+            return None
+        jump = abs(self._jump.value)
+        return jump / max(self.scale, 0.5 * jump)
+
+    @property
+    def between(self) -> bool:
+        """Whether the gradient's slope lies between the one-sided ones, or is one of them."""
+        assert self._jump is not None
+        assert self.level is not None
+        room = 0.5 * abs(self._jump.value) + DIFFERENT * (self._jump.uncertainty + self.level.uncertainty)
+        return abs(self.level.value) <= room
 
     @cached_property
     def inside(self) -> int | None:
@@ -112,7 +130,8 @@ class Reading:
             return "nothing"
         if self.kink is not None or self.inside:
             return "kink"
-        allowed = max(DIFFERENT * self.level.uncertainty, self.accepted * self.scale, self.by_nature)
+        by_nature = min(self.by_nature, RESOLVED * self.size)
+        allowed = max(DIFFERENT * self.level.uncertainty, self.accepted * self.scale, by_nature)
         if abs(self.level.value) > allowed:
             return "plateau"
         return "agrees" if self.known_to <= RESOLVED else "noise"
@@ -135,11 +154,24 @@ class Reading:
         return fit(self.sweep.h, self.errors(central=False), self.noise / (self.scale or 1.0))
 
 
-def stencil_changes(active_set: Callable[[Array], Hashable], p: Array, v: Array) -> Callable[[float], int]:
-    """step -> changes of the active set from p - h v over p to p + h v; points where it raises count as no change."""
+def stencil_changes(subject: Subject, v: Array) -> Callable[[float], int] | None:
+    """step -> changes of the active set from p - h v over p to p + h v; points where it is not known do not count."""
+    active_set = subject.active_set
+    if active_set is None:
+        return None
+
+    def at(q: Array) -> Hashable | None:
+        if not subject.inside(q):
+            return None
+        try:
+            found: Hashable | None = active_set(q)
+            hash(found)
+        except FOREIGN:
+            return None
+        return found
 
     def changes(h: float) -> int:
-        sets = [active_set(p + t * h * v) for t in (-1.0, 0.0, 1.0)]
-        return sum(a != b for a, b in pairwise(sets))
+        known = [found for t in (-1.0, 0.0, 1.0) if (found := at(subject.p + t * h * v)) is not None]
+        return sum(a != b for a, b in pairwise(known))
 
     return changes

@@ -16,6 +16,7 @@ from problems.errors import InputError, RoutesError
 from problems.problem import Array, Offers, Problem
 from routes.model import Model
 from routes.newton import Solver
+from routes.refinement import LinearizedSolver
 from routes.route import Options, Result, Route
 from routes.twin import with_synthetic_data
 
@@ -40,7 +41,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
 
     return Subject(
         name=f"{route.name} on {problem.name}",
-        objective=_counted(model),
+        objective=model.value,
         gradient=gradient,
         p=p,
         scale=parameters.scale,
@@ -48,18 +49,14 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         upper=upper,
         closed=False,
         label=parameters.label,
-        position=parameters.position,
         tighten=lambda factor: subject(problem, route, _more(options), p, _tighter(solver, factor)),
         active_set=_active_set(problem, solver),
         refine=_refined(problem, route, options, p, solver),
+        exact=(lambda: exact(problem, p)) if Offers.LINEARIZE in offers else None,
         slopes=(lambda V: complex_slopes(Model(problem, TIGHT), p, V)) if Offers.COMPLEX in offers else None,
         explain=(lambda g: explain(model, returned[0], p, g)) if Offers.LINEARIZE in offers else None,
         accuracy=route.accuracy,
     )
-
-
-def _counted(model: Model) -> Callable[[Array], float]:
-    return lambda q: model.value(q)
 
 
 def _tighter(solver: Solver, factor: float) -> Solver:
@@ -112,6 +109,15 @@ def _refined(
         return subject(with_synthetic_data(finer), route, options, q, solver)
 
     return refine
+
+
+def exact(problem: Problem, p: Array) -> Array:
+    """dJ/dp by the adjoint method, solved tightly and with new factors."""
+    model = Model(problem, TIGHT)
+    state = model.solve(p, polish=1)
+    lin = model.linearize(state)
+    lam = LinearizedSolver(model, state, "fresh").solve_transposed(-lin.J_u)
+    return np.asarray(lin.J_p + lin.R_p.T @ lam)
 
 
 def explain(model: Model, result: Result, p: Array, gradient: Array) -> list[Finding]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from bench.checking.finding import Finding
@@ -37,7 +37,7 @@ class Tightened:
 
 @dataclass(frozen=True)
 class Refined:
-    """Plateaus along the same smooth fields before and after the mesh size was halved, and the order between."""
+    """|(g - exact) w| / |exact w| before and after the mesh size was halved, and the order between."""
 
     before: float
     after: float
@@ -50,6 +50,7 @@ class Check:
 
     readings   every line looked at; deciding: the one the verdict rests on
     culprit    the factor, component or functional that is wrong, where it could be told
+    not_done   what would have told more, and why it was not done
     calls      of the objective, tightened and refined ones included; gradients likewise
     """
 
@@ -65,9 +66,10 @@ class Check:
     findings: tuple[Finding, ...] = ()
     culprit: str | None = None
     noise: float | None = None
+    not_done: tuple[str, ...] = ()
     calls: int = 0
     gradients: int = 0
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = ()
 
     @property
     def exit_code(self) -> int:
@@ -115,5 +117,5 @@ class Check:
             "findings": [vars(f) | {"sound": f.sound} for f in self.findings],
             "calls": self.calls,
             "gradient_calls": self.gradients,
-            "remarks": list(self.remarks),
+            "remarks": [*self.not_done, *self.remarks],
         }

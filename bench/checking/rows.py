@@ -29,7 +29,7 @@ def _points(factor: float, reading: Reading) -> Iterator[Row]:
             "error_central": np.abs(made.off_central) / scale,
         }
     fixed = {
-        "line": made.probe.name,
+        "line": made.line.name,
         "line_says": reading.says,
         "tightened": factor,
         "slope": reading.slope,

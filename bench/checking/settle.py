@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
 
 import numpy as np
 
 from bench.checking.asked import Unusable
 from bench.checking.examine import Examination
-from bench.checking.guarded import Guarded
-from bench.checking.plan import Plan
-from bench.checking.plateau import level
-from bench.checking.probe import Probe, sweep
-from bench.checking.reading import RESOLVED, Reading
+from bench.checking.guarded import FOREIGN
+from bench.checking.line import directions
+from bench.checking.plateau import DIFFERENT
+from bench.checking.reading import Reading
 from bench.checking.result import Refined, Tightened
-from bench.checking.subject import Subject
 from problems.errors import RoutesError
 from problems.problem import Array
 
 FACTORS = (1e-3, 1e-6)  # of the forward tolerance
 FALLEN = 1.0 / 3.0
-FIELDS = 2  # smooth directions compared between meshes
-BESIDE = 0.5  # decades on both sides of the best step, where they are
-WAVES = 0.75  # periods of a smooth direction across the body, at most
+BESIDE = 0.5  # decades on both sides of the best step, where a line is looked at once more
 SHRINKS = 0.6  # order in h from which on a plateau is one of the discretization
+EXACT = 1e-6  # relative: of adjoints by solves to 1e-12
 
 
 def fell(before: Reading, after: Reading) -> bool:
@@ -33,31 +30,40 @@ def fell(before: Reading, after: Reading) -> bool:
     return before.says == after.says == "plateau" and after.off < FALLEN * before.off
 
 
-def tighten(seen: Examination, reading: Reading) -> Iterator[Tightened]:
-    """The line of `reading` once more with a tighter forward solve, and a tighter one until what stood there falls."""
+def tighten(seen: Examination, reading: Reading) -> tuple[tuple[Tightened, ...], str | None]:
+    """The line of `reading` with a tighter forward solve, and a tighter one until what stood there falls.
+
+    And why that ended early, where it did.
+    """
+    found: list[Tightened] = []
     for factor in FACTORS:
         again = _again(seen, reading, factor)
-        if again is None or again.reading.says == "nothing":  # a solver that cannot be tightened says nothing
-            return
-        yield again
+        if isinstance(again, str):
+            return tuple(found), again
+        found.append(again)
         if fell(reading, again.reading):
-            return
+            break
+    return tuple(found), None
 
 
-def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | None:
-    """None where the tightened subject cannot be had, or its calls are not left."""
-    plan, line = seen.plan, reading.sweep.probe
+def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | str:
+    """In words where the tightened subject cannot be had, or its calls are not left."""
+    assert seen.subject.tighten is not None
+    plan, line = seen.plan, reading.sweep.line
     h = plan.steps if plan.everywhere or reading.level is None else plan.near(reading.level.h)
-    if seen.subject.tighten is None or seen.J.left() < 2 * len(h) + 2:
-        return None
+    needed = 2 * len(h) + 2
+    if seen.J.left() < needed:
+        return f"the forward solve was not tightened by {factor:g}: {seen.J.left():g} calls left, {needed} needed"
     try:
         subject = seen.subject.tighten(factor)
         other = Examination.of(subject, plan, seen.J.sharing(subject.objective), seen.accepted)
-        if not plan.everywhere:
-            other.readings.append(reading)  # tells the noise of J, which few steps cannot
-        tight = other.read(line, h)
-    except (Unusable, RoutesError):
-        return None
+    except FOREIGN as failure:
+        return f"tighten({factor:g}) gave nothing to look at: {type(failure).__name__}: {failure}"
+    if not plan.everywhere:
+        other.readings.append(reading)  # tells the noise of J, which few steps cannot
+    tight = other.read(line, h)
+    if tight.says == "nothing":
+        return f"J tightened by {factor:g} is not to be had along {line.name}"
     moved = np.linalg.norm((other.gradient - seen.gradient) * seen.subject.natural)
     quotients = reading.quotient, tight.quotient
     by = abs(quotients[0] - quotients[1]) if None not in quotients else float("nan")  # type: ignore[operator]
@@ -68,48 +74,45 @@ def _relative(value: float, scale: float) -> float:
     return value / scale if scale else value
 
 
-def refine(seen: Examination, other: Subject, h: float) -> Refined | None:
-    """Plateaus along smooth fields of the parameters on both meshes, with steps about h.
+def refine(seen: Examination, reading: Reading) -> Refined | str:
+    """How far the gradient is from the exact one on both meshes, each held against quotients along a line.
 
-    None where the two cannot be compared, or the budget does not suffice.
+    In words where that cannot be told.
     """
-    steps = seen.plan.near(h, BESIDE)
-    if seen.J.left() < 4 * (FIELDS * len(steps) + 1):
-        return None
-    before = _plateau(seen.subject, seen.plan, seen.J, steps)
-    after = _plateau(other, seen.plan, seen.J, steps)
-    if before is None or after is None:
-        return None
-    order = float(np.log2(before / after)) if after > 0.0 < before else float("inf")
-    return Refined(before, after, order)
-
-
-def _plateau(subject: Subject, plan: Plan, J: Guarded, h: Array) -> float | None:
-    """Root mean square of |quotient - slope| / sum |g_i v_i| along smooth fields v."""
-    guarded, fields = J.sharing(subject.objective), smooth_fields(subject, plan.seed)
+    assert seen.subject.refine is not None
     try:
-        seen = Examination.of(subject, plan, guarded)
-    except Unusable:
-        return None
-    found = []
-    for k, v in enumerate(fields):
-        made = sweep(guarded, seen.J_0, subject, seen.gradient, Probe(f"smooth field {k + 1}", v), h)
-        whole = float(np.abs(seen.gradient * v).sum())
-        at = level(made.h, made.off_central, 0.0, RESOLVED * whole)
-        if at is None or whole == 0.0:
-            return None
-        found.append(at.value / whole)
-    return float(np.sqrt(np.mean(np.square(found)))) if found else None
+        finer = seen.subject.refine()
+    except RoutesError as failure:
+        return str(failure)
+    if finer is None or finer.exact is None or seen.subject.exact is None:
+        return "there is no finer mesh for this unknown"
+    (line,) = directions(finer, 1, seen.plan.seed)
+    assert reading.level is not None
+    h = seen.plan.near(reading.level.h, BESIDE)
+    if seen.J.left() < 2 * len(h) + 2:
+        return f"the mesh was not refined: {seen.J.left():g} calls left, {2 * len(h) + 2} needed"
+    try:
+        fine = Examination.of(finer, seen.plan, seen.J.sharing(finer.objective), seen.accepted)
+        exact, exact_fine = seen.subject.exact(), finer.exact()
+    except (Unusable, RoutesError) as failure:
+        return f"on the finer mesh: {failure}"
+    if not (_meets(exact, reading) and _meets(exact_fine, fine.read(line, h))):
+        return "the exact gradient does not meet the quotients either"
+    before, after = _off(seen, exact), _off(fine, exact_fine)
+    if not before > seen.accepted:
+        return "the gradient is the exact one"
+    return Refined(before, after, math.log2(before / max(after, np.finfo(np.float64).tiny)))
 
 
-def smooth_fields(subject: Subject, seed: int) -> list[Array]:
-    """Natural changes that vary slowly in space, the same on every mesh: w_i cos(2 pi k . x_i + phi)."""
-    x = subject.position
-    if x is None:
-        return []
-    rng = np.random.default_rng(seed)
-    low, extent = x.min(axis=0), np.ptp(x, axis=0)
-    x = (x - low) / np.where(extent > 0, extent, 1.0)
-    waves = rng.uniform(-WAVES, WAVES, (FIELDS, x.shape[1]))
-    phases = rng.uniform(0.0, 2.0 * np.pi, FIELDS)
-    return [subject.natural * np.cos(2.0 * np.pi * x @ k + phi) for k, phi in zip(waves, phases, strict=True)]
+def _meets(exact: Array, reading: Reading) -> bool:
+    """Whether this gradient's slope is the quotient that a line has settled on."""
+    if reading.level is None or reading.quotient is None:
+        return False
+    allowed = max(DIFFERENT * reading.level.uncertainty, EXACT * reading.scale)
+    return abs(float(exact @ reading.sweep.line.v) - reading.quotient) <= allowed
+
+
+def _off(seen: Examination, exact: Array) -> float:
+    """|(g - exact) w| / |exact w|."""
+    w = seen.subject.natural
+    return _relative(float(np.linalg.norm((seen.gradient - exact) * w)), float(np.linalg.norm(exact * w)))

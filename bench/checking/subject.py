@@ -22,10 +22,11 @@ class Subject:
     objective   p -> J(p), a number; gradient: p -> (n_p,)
     scale       (n_p,) > 0, natural changes: steps are relative to max(|p_i|, scale_i)
     lower, upper (n_p,) bounds of p; `closed` tells whether J may be asked for on them
-    label       name of component i; position (n_p, d), where it lives
+    label       name of component i
     tighten     factor < 1 -> the same subject, its solver's tolerance times that
     active_set  p -> which smooth branch of J holds there
     refine      () -> the same subject on a mesh of half the size
+    exact       () -> dJ/dp (n_p,) by the adjoint method, for comparison only
     slopes      V (n_p, m) -> V^T dJ/dp by complex steps, which need no step size
     explain     gradient -> findings on the factors it is made of
     accuracy    error that the gradient may have by its nature, as one by finite differences has, relative to |g w| or J
@@ -40,10 +41,10 @@ class Subject:
     upper: Array
     closed: bool = True
     label: Callable[[int], str] = default_label
-    position: Array | None = None
     tighten: Callable[[float], Subject] | None = None
     active_set: Callable[[Array], Hashable] | None = None
     refine: Callable[[], Subject | None] | None = None
+    exact: Callable[[], Array] | None = None
     slopes: Slopes | None = None
     explain: Callable[[Array], list[Finding]] | None = None
     accuracy: float = 0.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from bench.checking.asked import Unusable
+from bench.checking.curve import Curve
 from bench.checking.examine import Examination
 from bench.checking.guarded import Accident
 from bench.checking.locate import Located, Worst
@@ -16,6 +18,7 @@ from bench.checking.result import Check, Verdict
 
 SHOWN = 3  # accidents and components named in a sentence
 NEXT_TO_ONE = 0.01
+ODD = 0.25  # off the slopes 1 and 2
 TIGHTEN = "offer tighten(factor), which returns the same thing with its solver tightened"
 
 
@@ -29,40 +32,51 @@ def undetermined(check: Check, why: str, todo: str) -> Check:
 
 
 def on_agreement(check: Check, noisy: Sequence[Reading]) -> Check:
-    line = check.deciding
-    assert line is not None
+    reading = check.deciding
+    assert reading is not None
+    agreeing = [r for r in check.readings if r.says == "agrees" and (r.sweep.line.index is None or r is reading)]
+    to = max(max(r.off, r.known_to) for r in agreeing)
     says = (
-        f"differences agree with the gradient to {max(line.off, line.known_to):.1e} along {_lines(check)};"
-        f" best step {_best(line)}, floor {_floor(line)}"
+        f"differences agree with the gradient to {to:.1e} along {_lines(check)};"
+        f" best step {number(_curve(reading).best_step, 2)}, floor {number(_curve(reading).floor, 2)}"
     )
-    unsound = [f.name for f in check.findings if f.sound is False and not f.name.startswith("Taylor")]
     if noisy:
-        names = ", ".join(r.sweep.probe.name for r in noisy[:SHOWN])
+        names = ", ".join(r.sweep.line.name for r in noisy[:SHOWN])
         says += f"; too small for the noise of J to tell: {names}"
+    unsound = [f for f in check.findings if f.sound is False and not f.name.startswith("Taylor")]
     todo = "nothing: use it"
     if unsound:
-        todo = f"look at {unsound[0]}, which differences do not resolve"
+        says += f"; yet {unsound[0].name}: {unsound[0].value:.1e}"
+        todo = f"look at {unsound[0].culprit or unsound[0].name}, which differences do not resolve"
     return replace(check, verdict="agrees", says=says, todo=todo)
 
 
-def on_kink(check: Check) -> Check:
-    line = check.deciding
-    assert line is not None
-    where = f"along {line.sweep.probe.name}"
-    inside = "" if line.inside is None else f"{line.inside} active-set changes inside the stencil at h = {_h(line)}"
-    if line.kink is None:
+def on_kink(check: Check, plateaus: Sequence[Reading]) -> Check:
+    reading = check.deciding
+    assert reading is not None
+    where = f"along {reading.sweep.line.name}"
+    h = "" if reading.level is None else f" at h = {reading.level.h_min:.1e}"
+    inside = "" if not reading.inside else f"{reading.inside} active-set changes inside the stencil{h}"
+    if reading.kink is None:
         says = f"{inside} {where}: J has a kink there, and quotients mix its two slopes"
     else:
-        says = f"one-sided quotients {where} converge to numbers {line.kink:.2g} apart, relative"
+        says = f"one-sided quotients {where} converge to numbers {reading.kink:.2g} apart, relative to them"
         says += f"; {inside}" if inside else ""
-    todo = "move p off the kink, or difference to one side of it only: the gradient is one of the two slopes"
+    todo = "move p off the kink, or difference to one side of it only"
+    if reading.kink is not None and reading.between:
+        todo += ": the gradient lies between the slopes of the two sides"
+    elif reading.kink is not None:
+        todo += ": the gradient is neither of the two slopes nor between them"
+    if plateaus:
+        worst = max(plateaus, key=lambda r: r.off)
+        todo += f"; along {worst.sweep.line.name}, which is smooth, it is off by {worst.off:.2g} {_relative_to(worst)}"
     return replace(check, verdict="non-smooth", says=says, todo=todo)
 
 
 def on_noise(check: Check) -> Check:
-    line = check.deciding
-    assert line is not None
-    noise = f"J scatters by {line.noise:.1e}"
+    reading = check.deciding
+    assert reading is not None
+    noise = f"J scatters by {reading.noise:.1e}"
     if check.tightened and check.tightened[-1].reading.says == "agrees":
         last = check.tightened[-1]
         says = (
@@ -70,39 +84,41 @@ def on_noise(check: Check) -> Check:
             f" {last.reading.known_to:.1e}"
         )
         return replace(check, verdict="solver-limited", says=says, todo=_tighten_for_good(check))
-    says = f"{noise}: the best step leaves a relative uncertainty of {line.known_to:.1e}, and nothing can be told"
-    todo = "tighten the forward solve" + (f": {TIGHTEN}" if not check.tightened else ", or check by other means")
+    says = f"{noise}: the best step leaves a relative uncertainty of {reading.known_to:.1e}, and nothing can be told"
+    todo = "tighten the forward solve"
+    todo += ", or check by other means" if check.tightened or check.not_done else f": {TIGHTEN}"
     return replace(check, verdict="noise-limited", says=says, todo=todo)
 
 
 def on_plateau(check: Check, verdict: Verdict) -> Check:
-    line, located = check.deciding, check.located
-    assert line is not None
-    says = f"a plateau of {line.off:.2g} {_relative_to(line)} along {line.sweep.probe.name}, whatever the step"
-    culprit = check.culprit
+    reading, located, culprit = check.deciding, check.located, check.culprit
+    assert reading is not None
+    says = f"a plateau of {reading.off:.2g} {_relative_to(reading)} along {reading.sweep.line.name}, whatever the step"
     if verdict == "solver-limited":
         last = check.tightened[-1]
         says += f", falls to {last.reading.off:.1e} when the forward solve is tightened by {last.factor:g}"
-        says += f": {_who_moved(check)}"
-        return replace(check, verdict=verdict, says=says, todo=_tighten_for_good(check))
-    if verdict == "inconsistent-discretization":
-        assert check.refined is not None
-        says += f"; along smooth fields {check.refined.before:.2g}, and {check.refined.after:.2g} on a mesh of half the"
-        says += f" size: it shrinks like h^{check.refined.order:.1f}"
-        todo = "differentiate what is computed: discretize first, then optimize"
-        return replace(check, verdict=verdict, says=says, todo=todo, culprit="an adjoint discretized on its own")
+        return replace(check, verdict=verdict, says=f"{says}: {_who_moved(check)}", todo=_tighten_for_good(check))
     if check.tightened:
         says += f", does not fall when the forward solve is tightened by {check.tightened[-1].factor:g}"
     if check.refined is not None:
-        says += f", nor with the mesh (h^{check.refined.order:.1f})"
+        before, after, order = check.refined.before, check.refined.after, check.refined.order
+        says += f"; the whole gradient is off by {before:.2g}, and by {after:.2g} on a mesh of half the size"
+        if verdict == "inconsistent-discretization":
+            says += f": it shrinks like h^{order:.1f}"
+            todo = "differentiate what is computed: discretize first, then optimize"
+            return replace(check, verdict=verdict, says=says, todo=todo, culprit="an adjoint discretized on its own")
+        says += f": h^{order:.1f}, no matter of the mesh"
     if located is not None and located.worst:
         says += f"; {_components(located)}"
         culprit = culprit or _component_culprit(located)
     if verdict == "undetermined":
+        if check.not_done:
+            says += "; whether a tighter solve moves it was not seen"
+            return replace(check, verdict=verdict, says=says, todo="give it more calls", culprit=culprit)
         says += "; so small a plateau may be a loosely solved J as well as a small wrong term"
         return replace(check, verdict=verdict, says=says, todo=TIGHTEN, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
-    if not check.tightened and not (located is not None and located.right):
+    if not check.tightened and not check.not_done and not (located is not None and located.right):
         todo += f"; to rule out the solver, {TIGHTEN}"
     return replace(check, verdict=verdict, says=says, todo=todo, culprit=culprit)
 
@@ -112,7 +128,11 @@ def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
     J, said = seen.J, list(seen.asked.remarks)
     if J.mutates:
         said.append("the objective changes p in place: it was given copies")
-    if len(seen.repeated) > 2:
+    if seen.remembers:
+        said.append(
+            f"J(p) has changed by {seen.remembers:.1e} after calls at other points: does it start from the last?"
+        )
+    elif len(seen.repeated) > 2:
         said.append(f"J is not deterministic: {len(seen.repeated)} calls at p scatter by {np.std(seen.repeated):.1e}")
     if J.eps > np.finfo(np.float64).eps:
         said.append(f"J has the precision of float32: its noise is at least {J.eps * abs(seen.J_0):.1e}")
@@ -122,14 +142,28 @@ def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
         said.append(f"on their bounds, differenced to one side: {names}" + (" ..." if bound.size > SHOWN else ""))
     if J.accidents:
         said.append(_accidents(J.accidents, seen))
-    scaled = [r.sweep.probe.name for r in check.readings if r.sweep.probe.index is not None and not r.own_scale]
-    if scaled and check.verdict == "agrees":
+    scaled = [r.sweep.line.name for r in check.readings if r.sweep.line.index is not None and not r.own_scale]
+    if scaled and check.verdict == "agrees" and len(seen.subject.p) > 1:
         said.append(f"relative to the whole gradient, being too small to stand alone: {', '.join(scaled[:SHOWN])}")
-    if J.left() < 4:
+    if check.verdict == "agrees" and check.deciding is not None:
+        said += _odd_slopes(check.deciding)
+    unread = sum(r.says == "nothing" for r in check.readings)
+    if J.left() < 2 and math.isfinite(seen.plan.budget):
+        what = f"; {unread} lines were not looked at" if unread else ""
         said.append(
-            f"the budget of {seen.plan.budget:g} calls is spent: {int(2 * seen.plan.budget)} would look at every line"
+            f"the budget of {seen.plan.budget:g} calls is spent{what}: --budget {2 * seen.plan.budget:g} sees more"
         )
     return tuple(said)
+
+
+def _odd_slopes(reading: Reading) -> list[str]:
+    """Truncation slopes that are not 1 and 2."""
+    expected = ((reading.one_sided.slope, 1), (reading.central.slope, 2))
+    odd = [f"{slope:.2g} instead of {wanted}" for slope, wanted in expected if slope and abs(slope - wanted) > ODD]
+    if not odd:
+        return []
+    why = "J is less smooth than twice differentiable, or its higher derivatives rule"
+    return [f"truncation slopes along {reading.sweep.line.name}: {', '.join(odd)}: {why}"]
 
 
 def _accidents(accidents: Sequence[Accident], seen: Examination) -> str:
@@ -144,27 +178,17 @@ def _accidents(accidents: Sequence[Accident], seen: Examination) -> str:
 
 def _lines(check: Check) -> str:
     count = sum(r.says == "agrees" for r in check.readings)
-    directions = sum(r.says == "agrees" and r.sweep.probe.index is None for r in check.readings)
+    directions = sum(r.says == "agrees" and r.sweep.line.index is None for r in check.readings)
     parts = [(directions, "random direction"), (count - directions, "component")]
     return " and ".join(f"{n} {what}{'s' if n > 1 else ''}" for n, what in parts if n)
 
 
-def _best(line: Reading) -> str:
-    curve = line.central if line.sweep.two_sided else line.one_sided
-    return "unknown" if curve.best_step is None else f"{curve.best_step:.1e}"
+def _curve(reading: Reading) -> Curve:
+    return reading.central if reading.sweep.two_sided else reading.one_sided
 
 
-def _floor(line: Reading) -> str:
-    curve = line.central if line.sweep.two_sided else line.one_sided
-    return "unknown" if curve.floor is None else f"{curve.floor:.1e}"
-
-
-def _h(line: Reading) -> str:
-    return "unknown" if line.level is None else f"{line.level.h_min:.1e}"
-
-
-def _relative_to(line: Reading) -> str:
-    return "of the component" if line.own_scale else "of the gradient"
+def _relative_to(reading: Reading) -> str:
+    return "of the component" if reading.own_scale else "of the gradient"
 
 
 def _who_moved(check: Check) -> str:
@@ -186,11 +210,12 @@ def _components(located: Located) -> str:
     w = located.worst[0]
     named = ", ".join(x.name for x in located.worst[:SHOWN])
     if located.everywhere and located.factor is not None:
-        return f"all components looked at ({named}) are off by {_factor(located.factor)}"
+        return f"all components looked at ({named}) are off by {_factor(located.factor)}, as is the whole"
     if located.everywhere:
         return f"many components are wrong, {named} among them: {_pair(w)}"
-    rest = f", the other {located.right} are right" if located.right else ""
-    return f"{named}: {_pair(w)}{rest}"
+    if located.right:
+        return f"{named}: {_pair(w)}, the other {located.right} are right"
+    return f"at least {named} {'is' if len(located.worst) == 1 else 'are'} wrong: {_pair(w)}"
 
 
 def _pair(w: Worst) -> str:
@@ -212,5 +237,10 @@ def _component_culprit(located: Located) -> str:
     if located.everywhere:
         return "many components"
     factor = "" if w.factor is None else f", off by {_factor(w.factor)}"
-    more = f" and {len(located.worst) - 1} more" if len(located.worst) > 1 else ""
+    at_least = "" if located.right or len(located.worst) == 1 else "at least "
+    more = f" and {at_least}{len(located.worst) - 1} more" if len(located.worst) > 1 else ""
     return f"component {w.name}{factor}{more}"
+
+
+def number(value: float | None, digits: int) -> str:
+    return "unknown" if value is None else f"{value:.{digits}g}"

@@ -12,6 +12,7 @@ import click
 from bench.commands.shared import at_option, debug_option, solver_options, store_options
 from bench.commands.studying import no_plot_option, now, one_problem, writable
 from bench.commands.verdict import built, conclude, one_route, page_writable
+from bench.foreign_output import stdout_to_stderr
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -68,8 +69,6 @@ def check(
     from bench.checking.check import check as check_subject
     from bench.checking.plan import Plan
 
-    if not 0 <= accept < 1:
-        raise InputError(f"--accept {accept:g} - give a relative error >= 0 and < 1")
     started = now()
     ways = {"a target": target, "--objective": objective or gradient, "--problem or --route": problem or route}
     given = [name for name, value in ways.items() if value is not None]
@@ -82,7 +81,8 @@ def check(
     subject = _subject(target, objective, gradient, problem, route, at, solver)
     page_writable(html, kept)
     writable(kept)
-    found = check_subject(subject, plan, accept)
+    with stdout_to_stderr():
+        found = check_subject(subject, plan, accept)
     named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
     sys.exit(conclude(found, named, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept))
 

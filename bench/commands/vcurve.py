@@ -11,6 +11,7 @@ import click
 from bench.commands.shared import at_option, checked, debug_option, solver_options, store_options
 from bench.commands.studying import no_plot_option, now, one_problem, writable
 from bench.commands.verdict import built, conclude, one_route, page_writable
+from bench.foreign_output import stdout_to_stderr
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ def vcurve(
     _refuse_beyond(budget, price_of(lambda: looked_at.objective(p))[0], plan)
     page_writable(html, kept)
     writable(kept)
-    found = check(looked_at, plan)
+    with stdout_to_stderr():
+        found = check(looked_at, plan)
     what = {"problem": problem, "route": route, "at": at}
     sys.exit(conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept))
 

@@ -83,14 +83,14 @@ def curves(check: Check, reading: Reading) -> tuple[str, list[Curve]]:
         Curve("central", made.h, np.abs(made.off_central) / scale, "#D55E00"),
     ]
     for t, colour in zip(check.tightened, TIGHTENED, strict=False):
-        if t.reading.sweep.probe.name == made.probe.name:
+        if t.reading.sweep.line.name == made.line.name:
             errors = np.abs(t.reading.sweep.off_central) / scale
             found.append(Curve(f"central, tightened x {t.factor:g}", t.reading.sweep.h, errors, colour))
     if reading.noise:
         least = min((10.0**y for c in found for _, y in c.points), default=0.0)
         noise = reading.noise / (math.sqrt(2.0) * made.h) / scale
         found.append(Curve("noise of J over h", made.h, np.where(noise >= least, noise, np.nan), "#999999"))
-    return f"error of quotients along {made.probe.name}, relative", found
+    return f"error of quotients along {made.line.name}, relative", found
 
 
 def svg(titled: tuple[str, Sequence[Curve]]) -> str:
@@ -133,8 +133,8 @@ def svg(titled: tuple[str, Sequence[Curve]]) -> str:
 
 def _lines(check: Check) -> str:
     head = ("line", "says", "off by", "known to", "slope 1-sided", "slope central", "floor", "best step", "decades")
-    rows = [(r.sweep.probe.name, r) for r in check.readings]
-    rows += [(f"{t.reading.sweep.probe.name}, tightened x {t.factor:g}", t.reading) for t in check.tightened]
+    rows = [(r.sweep.line.name, r) for r in check.readings]
+    rows += [(f"{t.reading.sweep.line.name}, tightened x {t.factor:g}", t.reading) for t in check.tightened]
     return _table(head, [_cells(name, r) for name, r in rows])
 
 

@@ -60,9 +60,9 @@ def lines(check: Check) -> Table:
         table.add_column(name, justify="right", no_wrap=name != "decades")
     table.add_column("relative to", overflow="fold")
     for reading in check.readings:
-        table.add_row(*_cells(reading.sweep.probe.name, reading))
+        table.add_row(*_cells(reading.sweep.line.name, reading))
     for t in check.tightened:
-        table.add_row(*_cells(f"{t.reading.sweep.probe.name}, tightened x {t.factor:g}", t.reading), style="dim")
+        table.add_row(*_cells(f"{t.reading.sweep.line.name}, tightened x {t.factor:g}", t.reading), style="dim")
     return table
 
 
@@ -80,7 +80,7 @@ def _cells(name: str, reading: Reading) -> list[Text]:
         number(curve.floor, 2),
         number(curve.best_step, 2),
         number(curve.window, 2),
-        "itself" if reading.own_scale or len(reading.sweep.probe.v) == 1 else "gradient",
+        "itself" if reading.own_scale or len(reading.sweep.line.v) == 1 else "gradient",
     ]
     return [Text(cell) for cell in cells]
 
@@ -101,7 +101,7 @@ def curve(check: Check, reading: Reading, width: int) -> Text:
         predicted = reading.noise / (np.sqrt(2.0) * made.h) / scale
         shown = np.where(predicted <= 1.0, predicted, np.nan)
         series.append(Series("noise of J over h", h, shown.tolist(), ".", "dim"))
-    title = f"error of quotients along {made.probe.name}, relative"
+    title = f"error of quotients along {made.line.name}, relative"
     return Text(f"{title}\n", style="bold") + plot(series, "h", "error", width)
 
 

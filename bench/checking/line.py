@@ -15,16 +15,12 @@ LIKELY = 1e-6  # where truncation and round-off of central differences balance o
 
 
 @dataclass(frozen=True)
-class Probe:
+class Line:
     """The line p + t v. v (n_p,) is a natural change: w_i e_i for component i, xi_i w_i for a random direction."""
 
     name: str
     v: Array
     index: int | None = None
-
-    @property
-    def kind(self) -> str:
-        return "direction" if self.index is None else "component"
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,7 @@ class Sweep:
     g . (p_plus - p) / h and g . (p - p_minus) / h, with the steps as they were rounded.
     """
 
-    probe: Probe
+    line: Line
     J: float
     h: Array
     J_plus: Array
@@ -78,13 +74,13 @@ class Sweep:
         """Both, in the order of their steps."""
         order = np.argsort(np.concatenate([self.h, other.h]), kind="stable")
         arrays = [np.concatenate([getattr(self, a), getattr(other, a)])[order] for a in ARRAYS]
-        return Sweep(self.probe, self.J, *arrays)
+        return Sweep(self.line, self.J, *arrays)
 
 
 ARRAYS = ("h", "J_plus", "J_minus", "s_plus", "s_minus")
 
 
-def sweep(J: Guarded, J_0: float, subject: Subject, gradient: Array, probe: Probe, h: Array) -> Sweep:
+def sweep(J: Guarded, J_0: float, subject: Subject, gradient: Array, line: Line, h: Array) -> Sweep:
     """Evaluate J on both sides for every step, as far as the budget goes, the likeliest steps first; sides out of
     bounds are left out."""
     J_side, s_side = np.full((2, len(h)), np.nan), np.full((2, len(h)), np.nan)
@@ -93,29 +89,29 @@ def sweep(J: Guarded, J_0: float, subject: Subject, gradient: Array, probe: Prob
             break
         step = h[k]
         for side, sign in enumerate((1.0, -1.0)):
-            q = subject.p + sign * step * probe.v
+            q = subject.p + sign * step * line.v
             change = q - subject.p
             if change.any() and subject.inside(q):
                 J_side[side, k] = J(q)
                 s_side[side, k] = sign * float(gradient @ change) / step
-    return Sweep(probe, J_0, h, *J_side, *s_side)
+    return Sweep(line, J_0, h, *J_side, *s_side)
 
 
-def components(subject: Subject, indices: Sequence[int]) -> list[Probe]:
+def components(subject: Subject, indices: Sequence[int]) -> list[Line]:
     """A line along each of these components."""
     probes = []
     for i in indices:
         v = np.zeros_like(subject.p)
         v[i] = subject.natural[i]
-        probes.append(Probe(subject.label(int(i)), v, int(i)))
+        probes.append(Line(subject.label(int(i)), v, int(i)))
     return probes
 
 
-def directions(subject: Subject, count: int, seed: int) -> list[Probe]:
+def directions(subject: Subject, count: int, seed: int) -> list[Line]:
     """Random lines that miss no component: xi_i of either sign and of size 1/2 to 3/2. Never the gradient's own."""
     rng, n_p = np.random.default_rng(seed), len(subject.p)
     xi = rng.choice([-1.0, 1.0], (count, n_p)) * rng.uniform(0.5, 1.5, (count, n_p))
-    return [Probe(f"random direction {k + 1}", x * subject.natural) for k, x in enumerate(xi)]
+    return [Line(f"random direction {k + 1}", x * subject.natural) for k, x in enumerate(xi)]
 
 
 def chosen_components(gradient: Array, natural: Array, count: int) -> list[int]:
