@@ -152,7 +152,7 @@ def test_an_object_at_another_point(cli, mine: Path) -> None:
         ("", "nothing to check"),
         ("mine.py:Both --problem bar --route adjoint", "a target and --problem or --route given"),
         ("--objective mine.py:J --at p.csv", "go together"),
-        ("--objective mine.py:J --gradient mine.py:dJ", "no start - give" if False else "have no start"),
+        ("--objective mine.py:J --gradient mine.py:dJ", "have no start"),
         ("nowhere.py:Both", "no file nowhere.py here"),
         ("mine.py:Bth", "did you mean 'Both'?"),
         ("mine.py:nothing", "has no objective(p) and gradient(p)"),

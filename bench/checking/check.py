@@ -29,16 +29,21 @@ SMALL = 1e-2  # a plateau below may be a loosely solved J: solvers are seldom lo
 CLEARLY = 0.1  # error of a component, relative to itself, that no solver is loose enough for
 
 
-def check(subject: Subject, plan: Plan, accepted: float = 0.0) -> Check:
+def check(subject: Subject, plan: Plan, accept: float = 0.0) -> Check:
     """Is subject's gradient right? Never raises for what the subject does; what it prints goes to stderr.
 
-    accepted: a relative error, >= 0 and < 1, up to which the gradient need not be better (1e-7 at least). Raises
+    accept: a relative error, >= 0 and < 1, up to which the gradient need not be better (1e-7 at least). Raises
     InputError.
     """
-    if not 0.0 <= accepted < 1.0:
-        raise InputError(f"check: an accepted error of {accepted:g} - give a relative error >= 0 and < 1")
     with redirect_stdout(sys.stderr):
-        return _checked(subject, plan, accepted)
+        return _checked(subject, plan, accepted(accept))
+
+
+def accepted(error: float) -> float:
+    """A relative error that is good enough. Raises InputError."""
+    if not 0.0 <= error < 1.0:
+        raise InputError(f"check: accept={error:g} - give a relative error >= 0 and < 1")
+    return error
 
 
 def _checked(subject: Subject, plan: Plan, accepted: float) -> Check:
@@ -120,7 +125,8 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading) -> Check:
         return on_plateau(so_far, "inconsistent-discretization")
     if convicted is not None or _local(located):
         return on_plateau(so_far, "wrong-gradient")
-    clear = worst.off >= SMALL or any(w.off >= CLEARLY for w in located.worst)
+    whole = worst.sweep.line.index is None or len(seen.subject.p) == 1
+    clear = (whole and worst.off >= SMALL) or any(w.off >= CLEARLY for w in located.worst)
     if not so_far.tightened and (ended is not None or not clear):
         return on_plateau(so_far, "undetermined")
     return on_plateau(so_far, "wrong-gradient")

@@ -13,6 +13,8 @@ from problems.problem import Array
 
 LIKELY = 1e-6  # where truncation and round-off of central differences balance on a well-scaled problem
 
+NO_ROOM = 1e-3  # of a natural change, between p and a bound
+
 
 @dataclass(frozen=True)
 class Line:
@@ -108,9 +110,15 @@ def components(subject: Subject, indices: Sequence[int]) -> list[Line]:
 
 
 def directions(subject: Subject, count: int, seed: int) -> list[Line]:
-    """Random lines that miss no component: xi_i of either sign and of size 1/2 to 3/2. Never the gradient's own."""
+    """Random lines that miss no component: xi_i of either sign and of size 1/2 to 3/2. Never the gradient's own.
+
+    Components on a bound, or next to it, are moved inward by positive steps: one side of the line is then inside.
+    """
     rng, n_p = np.random.default_rng(seed), len(subject.p)
     xi = rng.choice([-1.0, 1.0], (count, n_p)) * rng.uniform(0.5, 1.5, (count, n_p))
+    no_room = NO_ROOM * subject.natural
+    xi = np.where(subject.p - subject.lower < no_room, np.abs(xi), xi)
+    xi = np.where(subject.upper - subject.p < no_room, -np.abs(xi), xi)
     return [Line(f"random direction {k + 1}", x * subject.natural) for k, x in enumerate(xi)]
 
 

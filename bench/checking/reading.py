@@ -141,7 +141,7 @@ class Reading:
     def errors(self, central: bool) -> Array:
         """Relative errors (m,) of the quotients: of the gradient; on a plateau, of the level instead."""
         off = self.sweep.off_central if central else self.sweep.off_forward
-        if self.says == "plateau" and self.level is not None:
+        if self.level is not None and self.off > DIFFERENT * self.known_to:
             off = off - self.level.value
         return np.asarray(np.abs(off) / (self.scale or 1.0))
 

@@ -66,6 +66,7 @@ def check(
 
     Exit code: 0 agrees, 1 wrong-gradient or inconsistent-discretization, 3 inconclusive, 2 wrong usage.
     """
+    from bench.checking.check import accepted
     from bench.checking.check import check as check_subject
     from bench.checking.plan import Plan
 
@@ -78,6 +79,7 @@ def check(
     if (problem is None) != (route is None):
         sys.exit(_contract(problem, route, at, solver, as_json))
     plan = Plan(budget=budget, seed=seed)
+    accepted(accept)
     subject = _subject(target, objective, gradient, problem, route, at, solver)
     page_writable(html, kept)
     writable(kept)
