@@ -9,7 +9,7 @@ import sys
 import traceback
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -59,7 +59,7 @@ class Routes(click.Group):
         except KeyboardInterrupt:
             what = "finished cases are printed, and kept unless --no-store"
             complain(f"interrupted - {what if ctx.invoked_subcommand == 'run' else 'nothing is kept'}")
-            ctx.exit(INTERRUPTED)
+            leave(INTERRUPTED)
         except BrokenPipeError:
             raise  # click ends quietly: whoever read has read enough
         except OSError as error:
@@ -67,6 +67,15 @@ class Routes(click.Group):
                 traceback.print_exc()
             complain(f"{error.strerror or error} - check where the output goes")
             ctx.exit(WRONG_USAGE)
+
+
+def leave(code: int) -> NoReturn:
+    """Exit at once: what XLA's threads are compiling cannot be waited for, and crashes where it is torn down."""
+    if "jax" in sys.modules:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def mend_streams() -> None:

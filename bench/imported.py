@@ -30,7 +30,8 @@ def imported(text: str) -> Any:
     module = _module(where, text)
     found: Any = module
     for part in name.split("."):
-        known = [n for n in vars(found) if not n.startswith("_")] if hasattr(found, "__dict__") else []
+        own = vars(found) if hasattr(found, "__dict__") else {}
+        known = [n for n, value in own.items() if not n.startswith("_") and not isinstance(value, ModuleType)]
         if part not in known and not hasattr(found, part):
             raise InputError(f"'{text}': {where} has no '{part}' - {did_you_mean(part, known) or 'it defines nothing'}")
         found = getattr(found, part)

@@ -56,7 +56,7 @@ def check(
         objective,
         gradient,
         start,
-        name=name or "the gradient",
+        name=name or str(getattr(gradient, "__name__", "the gradient")),
         scale=scale,
         bounds=bounds,
         names=names,
@@ -74,6 +74,7 @@ def assert_gradient(
     def test_my_gradient():
         assert_gradient(J, dJ, start=np.ones(3), budget=100)
     """
+    __tracebackhide__ = True  # pytest then shows the caller's line
     found = check(objective, gradient, start, **keywords)
     if found.verdict != "agrees":
-        raise AssertionError(f"{found.name}: {found.verdict}: {found.says} - {found.todo}")
+        raise AssertionError(str(found))

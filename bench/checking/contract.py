@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.checking.factors import EXACT, Factors, relative
 from bench.checking.finding import Finding
+from bench.checking.guarded import FOREIGN
 from problems.errors import InputError, RoutesError
 from problems.problem import Array, Offers, Problem
 from routes.forward_work import ForwardWork
@@ -35,12 +36,24 @@ class Contract:
 
 def of_problem(problem: Problem, p: Array, routes: Sequence[Route], solver: Solver) -> Contract:
     """Every promise that `problem.offers` makes, looked at near p and its solved state."""
-    return Contract(problem.name, tuple(_of_problem(problem, p, routes, solver)))
+    return Contract(problem.name, tuple(_as_far_as_it_goes(_of_problem(problem, p, routes, solver))))
 
 
 def of_route(problem: Problem, p: Array, route: Route, options: dict[str, Any], solver: Solver) -> Contract:
     """What a route promises, on one problem."""
-    return Contract(f"{route.name} on {problem.name}", tuple(_declared(problem, p, route, options, solver)))
+    found = _as_far_as_it_goes(_declared(problem, p, route, options, solver))
+    return Contract(f"{route.name} on {problem.name}", tuple(found))
+
+
+def _as_far_as_it_goes(findings: Iterator[Finding]) -> Iterator[Finding]:
+    """What raises on the way is a broken promise, and the last that is looked at."""
+    try:
+        yield from findings
+    except InputError:
+        raise
+    except FOREIGN as failure:
+        said = " ".join(str(failure).split())
+        yield _claim("everything asked for can be had", False, f"{type(failure).__name__}: {said} - see --debug")
 
 
 def _of_problem(problem: Problem, p: Array, routes: Sequence[Route], solver: Solver) -> Iterator[Finding]:
@@ -49,13 +62,13 @@ def _of_problem(problem: Problem, p: Array, routes: Sequence[Route], solver: Sol
         J = Model(problem, solver).value(p)
         yield _claim("J(p) is a finite number", np.isfinite(J), f"J = {J}")
         return
-    state = Model(problem, solver).solve(p)
-    yield Finding("forward residual |R(u, p)| / |R(u_0, p)|", state.residual, max(1e-9, 10 * solver.rtol))
-    u, q = _nearby(problem, state)
-    wrong_shapes = list(_shapes(problem, u, q))
+    wrong_shapes = list(_shapes(problem, problem.initial(p), p))
     yield _claim("shapes of u, R, R_u, R_p, J_u, J_p", not wrong_shapes, "; ".join(wrong_shapes))
     if wrong_shapes:
         return
+    state = Model(problem, solver).solve(p)
+    yield Finding("forward residual |R(u, p)| / |R(u_0, p)|", state.residual, max(1e-9, 10 * solver.rtol))
+    u, q = _nearby(problem, state)
     if Offers.LINEARIZE in problem.offers:
         yield from Factors(problem, u, q).findings()
     yield from _structure(problem, u, q)
@@ -97,7 +110,11 @@ def _nearby(problem: Problem, state: State) -> tuple[Array, Array]:
 
 def _shapes(problem: Problem, u: Array, p: Array) -> Iterator[str]:
     n_u, n_p = problem.n_state, len(p)
-    made = {"u": (u, n_u), "R": (problem.residual(u, p), n_u), "R_u w": (problem.tangent(u, p) @ u, n_u)}
+    R = np.asarray(problem.residual(u, p))
+    if u.shape != (n_u,) or R.shape != (n_u,):
+        yield f"u has the shape {u.shape}, R {R.shape}: n_state says ({n_u},)"
+        return
+    made: dict[str, tuple[Any, int]] = {"u": (u, n_u), "R": (R, n_u), "R_u w": (problem.tangent(u, p) @ u, n_u)}
     if Offers.LINEARIZE in problem.offers:
         lin = problem.linearize(u, p)
         made |= {
@@ -121,12 +138,14 @@ def _structure(problem: Problem, u: Array, p: Array) -> Iterator[Finding]:
     if problem.structure != "general":
         left, right = v * (R_u @ w), w * (R_u @ v)
         off = abs(left.sum() - right.sum()) / (np.abs(left).sum() + np.abs(right).sum())
-        yield Finding(f"R_u is symmetric (structure={problem.structure})", float(off), EXACT)
+        said = "" if off <= EXACT else "set structure='general'"
+        yield Finding(f"R_u is symmetric (structure={problem.structure})", float(off), EXACT, said)
     if problem.structure == "spd":
         yield _claim("w.R_u w > 0 (structure=spd)", w @ (R_u @ w) > 0, "R_u is not positive definite")
     if problem.linear:
         change = problem.residual(u + w, p) - problem.residual(u, p)
-        yield Finding("R(u + w) - R(u) = R_u w (linear=True)", relative(change, R_u @ w), EXACT)
+        off = relative(change, R_u @ w)
+        yield Finding("R(u + w) - R(u) = R_u w (linear=True)", off, EXACT, "" if off <= EXACT else "set linear=False")
 
 
 def _traced(problem: Problem, u: Array, p: Array) -> Iterator[Finding]:

@@ -36,11 +36,11 @@ def taylor(seen: Examination) -> Iterator[Finding]:
         remainder = np.abs(off * made.h)
         clear = (remainder > CLEAR * reading.noise) & (made.h <= SMALL)
         rate = slope(made.h, remainder, clear)
-        name = f"Taylor remainder {'with the gradient' if order == 2 else 'without it'}"
+        name = f"Taylor: J(p + h v) - J(p){' - h g.v' if order == 2 else ''} ~ h^{order}"
         if rate is None:
             yield Finding(name, float("nan"), RATE, f"too few steps clear of noise to see a rate of {order}")
         else:
-            yield Finding(name, abs(rate - order), RATE, f"rate {rate:.3g}, expected {order}")
+            yield Finding(name, abs(rate - order), RATE, f"rate {rate:.3g}")
 
 
 def complex_steps(seen: Examination) -> Iterator[Finding]:

@@ -109,8 +109,16 @@ class Factors:
         e = np.zeros_like(self.p)
         e[i] = 1.0
         wanted = along(self._by_p(self.problem.residual), self.p, e, self.exact)
-        share = float((self.lin.R_p @ e) @ wanted / (wanted @ wanted or 1.0))
-        return f"parameter {self.problem.parameters.label(i)}, off by the factor {share:.3g}"
+        given, name = np.asarray(self.lin.R_p @ e), self.problem.parameters.label(i)
+        share = float(given @ wanted / (wanted @ wanted or 1.0))
+        if relative(given, share * wanted) <= self.limit:
+            return f"parameter {name}, off by the factor {share:.3g}"
+        rows = np.flatnonzero(np.abs(given - wanted) > self.limit * norm(wanted))
+        return (
+            f"parameter {name}, {len(rows)} of {len(given)} rows, first {rows[0] + 1}"
+            if rows.size
+            else f"parameter {name}"
+        )
 
     def _wrong(self, members: Array) -> bool:
         v = np.zeros_like(self.v)

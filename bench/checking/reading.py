@@ -80,6 +80,11 @@ class Reading:
         return self.sweep.line.index is not None and self.scale < self.size
 
     @property
+    def looked_at(self) -> bool:
+        """Whether there were calls left for it."""
+        return bool(np.isfinite(self.sweep.s_plus).any() or np.isfinite(self.sweep.s_minus).any())
+
+    @property
     def off(self) -> float:
         """|quotient - slope| / scale at the level."""
         assert self.level is not None

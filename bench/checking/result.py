@@ -76,6 +76,14 @@ class Check:
         """0 agrees, 1 wrong, 3 inconclusive."""
         return EXIT.get(self.verdict, INCONCLUSIVE)
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.verdict}: {self.says} - {self.todo}"
+
+    @property
+    def findings_of_factors(self) -> bool:
+        """Whether the gradient was taken apart."""
+        return any(f.name.startswith("dR/dp") for f in self.findings)
+
     @property
     def plateau(self) -> float | None:
         """Relative difference of gradient and differences that does not depend on the step."""

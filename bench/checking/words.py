@@ -24,7 +24,8 @@ TIGHTEN = "offer tighten(factor), which returns the same thing with its solver t
 
 def on_unusable(check: Check, failure: Unusable) -> Check:
     verdict: Verdict = "wrong-gradient" if failure.wrong else "undetermined"
-    return replace(check, verdict=verdict, says=str(failure), todo="mend what the gradient returns")
+    todo = "mend what the gradient returns" if failure.wrong else "mend the gradient, which gives nothing at p"
+    return replace(check, verdict=verdict, says=str(failure), todo=todo)
 
 
 def undetermined(check: Check, why: str, todo: str) -> Check:
@@ -44,10 +45,12 @@ def on_agreement(check: Check, noisy: Sequence[Reading]) -> Check:
         names = ", ".join(r.sweep.line.name for r in noisy[:SHOWN])
         says += f"; too small for the noise of J to tell: {names}"
     unsound = [f for f in check.findings if f.sound is False and not f.name.startswith("Taylor")]
-    todo = "nothing: use it"
+    todo = "use it"
     if unsound:
         says += f"; yet {unsound[0].name}: {unsound[0].value:.1e}"
-        todo = f"look at {unsound[0].culprit or unsound[0].name}, which differences do not resolve"
+        todo = f"look at {unsound[0].culprit or unsound[0].name}"
+        if any(f.name.startswith("complex step") for f in unsound):
+            todo = "differences side with the gradient: do J and R take complex numbers (abs, norm, conj do not)?"
     return replace(check, verdict="agrees", says=says, todo=todo)
 
 
@@ -114,10 +117,12 @@ def on_plateau(check: Check, verdict: Verdict) -> Check:
     if verdict == "undetermined":
         if check.not_done:
             says += "; whether a tighter solve moves it was not seen"
-            return replace(check, verdict=verdict, says=says, todo="give it more calls", culprit=culprit)
+            return replace(check, verdict=verdict, says=says, todo=f"mend this: {check.not_done[0]}", culprit=culprit)
         says += "; so small a plateau may be a loosely solved J as well as a small wrong term"
         return replace(check, verdict=verdict, says=says, todo=TIGHTEN, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
+    if located is not None and located.everywhere and not check.culprit and not check.findings_of_factors:
+        todo += "; written as a Problem (CONTRIBUTING.md), its factors are tested one by one"
     if not check.tightened and not check.not_done and not (located is not None and located.right):
         todo += f"; to rule out the solver, {TIGHTEN}"
     return replace(check, verdict=verdict, says=says, todo=todo, culprit=culprit)
@@ -142,7 +147,12 @@ def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
         said.append(f"on their bounds, differenced to one side: {names}" + (" ..." if bound.size > SHOWN else ""))
     if J.accidents:
         said.append(_accidents(J.accidents, seen))
-    scaled = [r.sweep.line.name for r in check.readings if r.sweep.line.index is not None and not r.own_scale]
+    flat = [r for r in check.readings if r.looked_at and np.isfinite(r.sweep.forward).any()]
+    if flat and all(not np.nan_to_num(r.sweep.forward).any() for r in flat):
+        said.append("J has not changed at all: does it depend on p?")
+    scaled = [
+        r.sweep.line.name for r in check.readings if r.sweep.line.index is not None and r.level and not r.own_scale
+    ]
     if scaled and check.verdict == "agrees" and len(seen.subject.p) > 1:
         said.append(f"relative to the whole gradient, being too small to stand alone: {', '.join(scaled[:SHOWN])}")
     if check.verdict == "agrees" and check.deciding is not None:
@@ -202,7 +212,7 @@ def _who_moved(check: Check) -> str:
 
 
 def _tighten_for_good(check: Check) -> str:
-    todo = f"solve to a tolerance {check.tightened[-1].factor:g} times as large for good"
+    todo = f"divide the solver's tolerance by {1.0 / check.tightened[-1].factor:g}"
     return f"{todo}; look at {check.culprit}" if check.culprit else todo
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import at_option, debug_option, solver_options, store_options
+from bench.commands.shared import at_option, debug_option, refuse_given, solver_options, store_options
 from bench.commands.studying import no_plot_option, now, one_problem, writable
 from bench.commands.verdict import built, conclude, one_route, page_writable
 from bench.foreign_output import stdout_to_stderr
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from bench.checking.subject import Subject
     from routes.newton import Solver
 
+SOLVER = ("rtol", "max_steps", "linear_solver", "newton")
+UNUSED = ("budget", "accept", "seed", "html", "no_plot", "store")
 ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
 
 
@@ -29,7 +31,7 @@ ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too 
 @click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract.")
 @click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract.")
 @at_option
-@click.option("--budget", type=float, default=200.0, show_default=True, help="Objective calls at most.")
+@click.option("--budget", type=int, default=200, show_default=True, help="Objective calls at most.")
 @click.option("--accept", type=float, default=0.0, metavar="ERROR", help=ACCEPT)
 @solver_options
 @click.option("--seed", type=int, default=0, show_default=True, help="Of random directions.")
@@ -45,7 +47,7 @@ def check(
     problem: str | None,
     route: str | None,
     at: str,
-    budget: float,
+    budget: int,
     accept: float,
     solver: Solver,
     seed: int,
@@ -76,7 +78,10 @@ def check(
     if len(given) != 1:
         what = f"{' and '.join(given)} given" if given else "nothing to check"
         raise InputError(f"check: {what} - give FILE.py:NAME, or --objective and --gradient, or --problem and --route")
+    if problem is None and route is None:
+        refuse_given(SOLVER, "is for registered problems")
     if (problem is None) != (route is None):
+        refuse_given(UNUSED, "is for verdicts, a contract has none")
         sys.exit(_contract(problem, route, at, solver, as_json))
     plan = Plan(budget=budget, seed=seed)
     accepted(accept)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from problems.errors import InputError
 
@@ -68,6 +69,14 @@ def store_options(command: Command) -> Command:
         return command(kept=None if no_store else store, **others)
 
     return store_option(no_store_option(with_store))
+
+
+def refuse_given(names: Iterable[str], why: str) -> None:
+    """Options that would be ignored. Raises InputError for the first that was given."""
+    context = click.get_current_context()
+    for name in names:
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise InputError(f"--{name.replace('_', '-')}: {why} - leave it out")
 
 
 def checked(budget: float) -> float:

@@ -7,6 +7,7 @@ Each cell is one `routes check`: a problem at a random point, a route, and the v
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
@@ -160,6 +161,7 @@ def main() -> None:
     out.print(f"{len(found.cells)} cells, {len(found.misjudged)} misjudged")
     for judged in found.misjudged:
         out.print(Text(f"{judged.cell}: {judged.check.verdict}: {judged.check.says}", style="red"))
+    sys.exit(1 if found.misjudged else 0)
 
 
 if __name__ == "__main__":

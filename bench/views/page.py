@@ -12,6 +12,7 @@ import numpy as np
 from bench.checking.reading import Reading
 from bench.checking.result import Check
 from bench.views.format import number
+from bench.views.lines import HEADINGS, LEGEND, rows
 from problems.problem import Array
 
 COLOURS = {"agrees": "#009E73", "wrong-gradient": "#D55E00", "inconsistent-discretization": "#D55E00"}
@@ -33,7 +34,7 @@ svg text { font: 12px system-ui, sans-serif } .note { color: #555; font-style: i
 
 
 @dataclass(frozen=True)
-class Curve:
+class Trace:
     """Errors (m,) over steps (m,) under one name, in one colour."""
 
     name: str
@@ -55,11 +56,11 @@ def page(check: Check) -> str:
         f"<p>{escape(check.says)}</p><p><b>Next:</b> {escape(check.todo)}</p>",
     ]
     if check.readings:
-        body.append(f"<h2>Lines</h2>{_lines(check)}")
+        body.append(f"<h2>Lines</h2>{_lines(check)}{_components(check)}")
     body += [f"<figure>{svg(curves(check, r))}</figure>" for r in _drawn(check)]
     if check.findings:
         body.append(f"<h2>Second evidence</h2>{_findings(check)}")
-    body += [f"<p class='note'>{escape(remark)}</p>" for remark in check.remarks]
+    body += [f"<p class='note'>{escape(remark)}</p>" for remark in (*check.not_done, *check.remarks)]
     body.append(f"<p class='note'>{check.calls} objective calls, {check.gradients} gradient</p>")
     title = escape(f"{check.name}: {check.verdict}")
     meta = "<meta charset='utf-8'><meta name='viewport' content='width=device-width'>"
@@ -75,25 +76,25 @@ def _drawn(check: Check) -> list[Reading]:
     return [check.deciding, *others]
 
 
-def curves(check: Check, reading: Reading) -> tuple[str, list[Curve]]:
+def curves(check: Check, reading: Reading) -> tuple[str, list[Trace]]:
     """A title and the errors of one line, with those of the tightened solve where it was this line's."""
     made, scale = reading.sweep, reading.scale or 1.0
     found = [
-        Curve("one-sided", made.h, np.abs(made.off_forward) / scale, "#E69F00"),
-        Curve("central", made.h, np.abs(made.off_central) / scale, "#D55E00"),
+        Trace("one-sided", made.h, np.abs(made.off_forward) / scale, "#E69F00"),
+        Trace("central", made.h, np.abs(made.off_central) / scale, "#D55E00"),
     ]
     for t, colour in zip(check.tightened, TIGHTENED, strict=False):
         if t.reading.sweep.line.name == made.line.name:
             errors = np.abs(t.reading.sweep.off_central) / scale
-            found.append(Curve(f"central, tightened x {t.factor:g}", t.reading.sweep.h, errors, colour))
+            found.append(Trace(f"central, tightened x {t.factor:g}", t.reading.sweep.h, errors, colour))
     if reading.noise:
         least = min((10.0**y for c in found for _, y in c.points), default=0.0)
         noise = reading.noise / (math.sqrt(2.0) * made.h) / scale
-        found.append(Curve("noise of J over h", made.h, np.where(noise >= least, noise, np.nan), "#999999"))
+        found.append(Trace("noise of J over h", made.h, np.where(noise >= least, noise, np.nan), "#999999"))
     return f"error of quotients along {made.line.name}, relative", found
 
 
-def svg(titled: tuple[str, Sequence[Curve]]) -> str:
+def svg(titled: tuple[str, Sequence[Trace]]) -> str:
     """Log-log, decades as grid lines."""
     title, found = titled
     points = [p for c in found for p in c.points if p[1] <= HIGHEST]
@@ -132,34 +133,23 @@ def svg(titled: tuple[str, Sequence[Curve]]) -> str:
 
 
 def _lines(check: Check) -> str:
-    head = ("line", "says", "off by", "known to", "slope 1-sided", "slope central", "floor", "best step", "decades")
-    rows = [(r.sweep.line.name, r) for r in check.readings]
-    rows += [(f"{t.reading.sweep.line.name}, tightened x {t.factor:g}", t.reading) for t in check.tightened]
-    return _table(head, [_cells(name, r) for name, r in rows])
+    return _table(HEADINGS, [cells for _, cells in rows(check)]) + f"<p class='note'>{escape(LEGEND)}</p>"
 
 
-def _cells(name: str, reading: Reading) -> list[str]:
-    curve = reading.central if reading.sweep.two_sided else reading.one_sided
-    known = reading.level is not None
-    numbers = (
-        reading.off if known else None,
-        reading.known_to if known else None,
-        reading.one_sided.slope,
-        reading.central.slope,
-        curve.floor,
-        curve.best_step,
-        curve.window,
-    )
-    return [name, reading.says, *(number(v) for v in numbers)]
+def _components(check: Check) -> str:
+    if check.located is None or not check.located.worst:
+        return ""
+    cells = [(w.name, f"{w.given:.6g}", f"{w.found:.6g}", number(w.factor, 4)) for w in check.located.worst]
+    return "<h2>Wrong components</h2>" + _table(("component", "gradient", "differences", "ratio"), cells)
 
 
 def _findings(check: Check) -> str:
-    rows = []
+    found = []
     for f in check.findings:
         value = "" if math.isnan(f.value) else number(f.value, 2)
         mark = {True: "ok", False: "NO", None: "?"}[f.sound]
-        rows.append([f.name, mark, value, number(f.limit, 2), "; ".join(filter(None, (f.says, f.culprit)))])
-    return _table(("test", "", "value", "limit", ""), rows)
+        found.append([f.name, mark, value, number(f.limit, 2), "; ".join(filter(None, (f.says, f.culprit)))])
+    return _table(("test", "", "value", "limit", ""), found)
 
 
 def _td(cell: str) -> str:

@@ -11,9 +11,11 @@ from rich.text import Text
 
 from bench.checking.contract import Contract
 from bench.checking.finding import Finding
+from bench.checking.locate import Located
 from bench.checking.reading import Reading
 from bench.checking.result import Check
 from bench.views.format import number
+from bench.views.lines import HEADINGS, LEGEND, rows
 from bench.views.plot import Series, plot
 from bench.views.tables import show
 
@@ -37,6 +39,10 @@ def show_check(out: Console, check: Check, curves: bool = True) -> None:
     if check.readings:
         out.print()
         show(out, lines(check))
+        out.print(Text(LEGEND, style="dim"), soft_wrap=wrap)
+    if check.located is not None and check.located.worst:
+        out.print()
+        show(out, components(check.located))
     if curves and check.deciding is not None:
         out.print()
         out.print(curve(check, check.deciding, min(out.width, WIDEST)))
@@ -45,44 +51,33 @@ def show_check(out: Console, check: Check, curves: bool = True) -> None:
         show(out, evidence(check.findings))
     if check.readings:
         out.print()
-    for remark in check.remarks:
+    for remark in (*check.not_done, *check.remarks):
         out.print(Text(f"note: {remark}", style="italic"), soft_wrap=wrap)
-    out.print(Text(f"{check.calls} objective calls, {check.gradients} gradient", style="dim"), soft_wrap=wrap)
+    several = "" if check.gradients == 1 else "s"
+    out.print(Text(f"{check.calls} objective calls, {check.gradients} gradient{several}", style="dim"), soft_wrap=wrap)
 
 
 def lines(check: Check) -> Table:
     """One row a line: what its quotients say, in numbers."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("line", overflow="fold", min_width=12)
-    table.add_column("says", no_wrap=True)
-    names = ("off by", "known to", "slope 1-sided", "central", "round-off", "floor", "best step", "decades")
-    for name in names:
-        table.add_column(name, justify="right", no_wrap=name != "decades")
-    table.add_column("relative to", overflow="fold")
-    for reading in check.readings:
-        table.add_row(*_cells(reading.sweep.line.name, reading))
-    for t in check.tightened:
-        table.add_row(*_cells(f"{t.reading.sweep.line.name}, tightened x {t.factor:g}", t.reading), style="dim")
+    table.add_column(HEADINGS[0], overflow="fold", min_width=18)
+    for heading in HEADINGS[1:]:
+        table.add_column(heading, no_wrap=True, justify="left" if heading in ("says", "slopes") else "right")
+    for reading, cells in rows(check):
+        style = "red" if reading.says == "plateau" else ""
+        table.add_row(*(Text(cell) for cell in cells), style=style)
     return table
 
 
-def _cells(name: str, reading: Reading) -> list[Text]:
-    known = reading.level is not None
-    curve = reading.central if reading.sweep.two_sided else reading.one_sided
-    cells = [
-        name,
-        reading.says,
-        number(reading.off, 2) if known else "",
-        number(reading.known_to, 2) if known else "",
-        number(reading.one_sided.slope, 3),
-        number(reading.central.slope, 3),
-        number(curve.roundoff, 2),
-        number(curve.floor, 2),
-        number(curve.best_step, 2),
-        number(curve.window, 2),
-        "itself" if reading.own_scale or len(reading.sweep.line.v) == 1 else "gradient",
-    ]
-    return [Text(cell) for cell in cells]
+def components(located: Located) -> Table:
+    """Wrong components: what the gradient says and what differences say."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("wrong component", overflow="fold", min_width=15)
+    for heading in ("gradient", "differences", "ratio"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for w in located.worst:
+        table.add_row(Text(w.name), f"{w.given:.6g}", f"{w.found:.6g}", number(w.factor, 4))
+    return table
 
 
 def curve(check: Check, reading: Reading, width: int) -> Text:
