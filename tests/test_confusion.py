@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -11,8 +12,10 @@ from bench import case
 from bench.checking.check import check
 from bench.checking.plan import Plan
 from bench.checking.registered import subject
-from bench.studies.confusion import Cell, Judged, cells, judge, point
+from bench.studies.confusion import Cell, Judged, built, cells, judge, point
+from routes.adjoint import adjoint
 from routes.newton import Solver
+from routes.route import Offers, Result, route
 
 CELLS = list(cells(seed=7))
 DUFFING = f"{ROOT / 'examples' / 'plugin' / 'duffing' / 'problem.py'}:Duffing"
@@ -68,6 +71,21 @@ def assert_cell(cell: Cell) -> None:
     p = point(problem, cell.seed)
     found = check(subject(problem, route.route, route.options, p, Solver(rtol=cell.rtol)), Plan(seed=cell.seed))
     assert Judged(cell, found).right, found.says
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_errors_without_order_are_no_matter_of_the_mesh(seed: int) -> None:
+    """Every component 30 % too large or too small: along smooth fields that averages out as the mesh is refined."""
+
+    @route("scattered", needs=Offers.LINEARIZE, cost=adjoint.cost)
+    def scattered(model, p, *, factors="refined"):
+        J, g, *_ = adjoint.function(model, p)
+        return Result(J, g * (1.0 + 0.3 * np.random.default_rng(seed).choice([-1.0, 1.0], len(g))))
+
+    problem = built("advection")
+    found = check(subject(problem, scattered, {}, point(problem, seed), Solver()), Plan(seed=seed))
+    assert found.verdict == "wrong-gradient"
+    assert found.refined.order == pytest.approx(0.0, abs=0.3)  # the same error on both meshes
 
 
 def test_a_fault_that_cannot_show_says_so(cli) -> None:

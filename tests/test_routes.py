@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from problems.errors import DomainError, InputError, NotConverged
 from problems.problem import Array, Parameters, Problem, Reference
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
+from routes.faulty_adjoint import faulty_adjoint
 from routes.finite_difference import fd_central, fd_one_sided
 from routes.forward_work import ForwardWork
 from routes.implicit_ad import implicit_ad
@@ -139,6 +142,19 @@ def test_a_black_box_has_finite_differences_and_nothing_more() -> None:
         result = route.prepare(model, p)(p)
         assert relative_error(result.gradient, np.cos(p)) < ACCURACY[route.name]
         assert model.tally.work == route.cost(3, ForwardWork(Work(1)), **route.defaults) == Work(solves)
+
+
+FAULTS = get_args(get_args(inspect.signature(faulty_adjoint.function, eval_str=True).parameters["fault"].annotation)[0])
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("name", ["bar", "block[n=2]", "block[follower]", "advection"])
+def test_wrong_routes_declare_their_work_rightly(name: str, fault: str) -> None:
+    problem = ZOO[name]
+    if faulty_adjoint.objection(problem, fault=fault) is not None:
+        return
+    _, counted, declared = differentiate(faulty_adjoint, problem, problem.parameters.start, Solver(), fault=fault)
+    assert counted == declared
 
 
 def test_the_table_of_bills() -> None:

@@ -35,7 +35,7 @@ def check(subject: Subject, plan: Plan, accept: float = 0.0) -> Check:
     accept: a relative error, >= 0 and < 1, up to which the gradient need not be better (1e-7 at least). Raises
     InputError.
     """
-    with redirect_stdout(sys.stderr):
+    with redirect_stdout(sys.stderr), np.errstate(all="ignore"):
         return _checked(subject, plan, accepted(accept))
 
 
@@ -114,7 +114,7 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading) -> Check:
         so_far = replace(so_far, tightened=tightened, not_done=() if ended is None else (ended,))
     convicted = next((f for f in so_far.findings if f.culprit is not None), None)
     culprit = None if convicted is None else convicted.culprit
-    if so_far.tightened and settle.fell(worst, so_far.tightened[-1].reading):
+    if settle.falls(worst, so_far.tightened):
         return on_plateau(replace(so_far, culprit=culprit), "solver-limited")
     refined = None
     if convicted is None or convicted.by_mesh:
@@ -125,11 +125,20 @@ def _on_plateau(so_far: Check, seen: Examination, worst: Reading) -> Check:
         return on_plateau(so_far, "inconsistent-discretization")
     if convicted is not None or _local(located):
         return on_plateau(so_far, "wrong-gradient")
-    whole = worst.sweep.line.index is None or len(seen.subject.p) == 1
-    clear = (whole and worst.off >= SMALL) or any(w.off >= CLEARLY for w in located.worst)
-    if not so_far.tightened and (ended is not None or not clear):
+    tested = so_far.tightened and (so_far.findings_of_factors or any(t.moved for t in so_far.tightened))
+    if tested and settle.moves(worst, so_far.tightened):
+        return on_plateau(so_far, "undetermined")
+    if not tested and (ended is not None or not _gross(seen.readings, located)):
         return on_plateau(so_far, "undetermined")
     return on_plateau(so_far, "wrong-gradient")
+
+
+def _gross(readings: list[Reading], located: Located) -> bool:
+    """Whether a gradient is off by more than a solver is ever loose."""
+    whole = [r.off for r in readings if r.says == "plateau" and r.sweep.line.index is None]
+    factor = 1.0 if located.factor is None else located.factor
+    components = max((w.off for w in located.worst), default=0.0)
+    return max(whole, default=0.0) >= SMALL or abs(factor - 1.0) >= SMALL or components >= CLEARLY
 
 
 def _local(located: Located) -> bool:

@@ -16,7 +16,7 @@ from problems.problem import Array, Offers, Problem
 from routes.forward_work import ForwardWork
 from routes.model import Model
 from routes.newton import Solver, State, norm
-from routes.route import Route
+from routes.route import Result, Route
 from routes.tally import Work
 
 NEARBY = 1e-2  # relative: how far from p and from its state the contract is looked at
@@ -169,10 +169,22 @@ def _declared(problem: Problem, p: Array, route: Route, options: dict[str, Any],
     counted = model.tally.work - before
     shape = np.shape(result.gradient)
     yield _claim(f"{route.name}: gradient (n_p,)", shape == p.shape, f"its shape is {shape}, not {p.shape}")
+    wrong = ", ".join(_odd(problem, result))
+    yield _claim(f"{route.name}: J, u and lam are what they should be", not wrong, wrong)
     declared = route.cost(len(p), _forward(problem, p, solver, counted), **options)
     differs = {kind: (n, vars(declared)[kind]) for kind, n in vars(counted).items() if n != vars(declared)[kind]}
     said = ", ".join(f"{kind} counted {n}, declared {d}" for kind, (n, d) in differs.items())
     yield _claim(f"{route.name}: counted work is the declared work", not differs, said)
+
+
+def _odd(problem: Problem, result: Result) -> Iterator[str]:
+    """What else a route returns, where that is none."""
+    J = result.J
+    if J is not None and not (np.isrealobj(J) and isinstance(J, float | int | np.floating) and np.isfinite(J)):
+        yield f"J = {J!r} is no finite number"
+    for name, vector in (("u", result.u), ("lam", result.lam)):
+        if vector is not None and np.shape(vector) != (problem.n_state,):
+            yield f"{name} has the shape {np.shape(vector)}, not ({problem.n_state},)"
 
 
 def _forward(problem: Problem, p: Array, solver: Solver, counted: Work) -> ForwardWork:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bench.accuracy import norm2
 from bench.checking.asked import Asked, ask
 from bench.checking.guarded import Guarded
 from bench.checking.line import Line, Sweep, chosen_components, components, directions, sweep
@@ -18,6 +19,8 @@ from problems.problem import Array
 
 EQUAL = 1e-7  # seven digits: differences seldom give more, and nobody asks for more
 PER_EPS = 100.0  # relative error that is rounding, in eps of the numbers
+COARSEST = 1e-3  # of that: float16 has three digits
+ALL = 6  # components that are all looked at where there are no more
 REPEATS = 4  # further evaluations at p, where two differ
 
 
@@ -48,7 +51,7 @@ class Examination:
             values += [J(subject.p) for _ in range(REPEATS) if J.left() > 0]
         repeated = np.array([v for v in values if np.isfinite(v)])
         J_0 = float(repeated.mean()) if repeated.size else float("nan")
-        by_precision = PER_EPS * asked.eps if asked.eps > np.finfo(np.float64).eps else 0.0
+        by_precision = min(PER_EPS * asked.eps, COARSEST) if asked.eps > np.finfo(np.float64).eps else 0.0
         allowed = max(EQUAL, accepted, by_precision)
         return cls(subject, plan, J, asked, J_0, repeated, allowed)
 
@@ -59,12 +62,12 @@ class Examination:
     @property
     def size(self) -> float:
         """|g w|_2, the slope of J along a random natural change."""
-        return float(np.linalg.norm(self.gradient * self.subject.natural))
+        return norm2(self.gradient * self.subject.natural)
 
     def lines(self) -> list[Line]:
         """A random direction first, then components, then the other directions."""
         plan, n_p = self.plan, len(self.subject.p)
-        few = plan.components
+        few = n_p if n_p <= ALL and not plan.everywhere else plan.components
         indices = chosen_components(self.gradient, self.subject.natural, few) if isinstance(few, int) else list(few)
         first, *others = directions(self.subject, plan.directions, plan.seed)
         if n_p == 1:
@@ -97,8 +100,9 @@ class Examination:
         return self._reading(sweep(self.J, self.J_0, self.subject, self.gradient, line, h))
 
     def _wider(self, reading: Reading) -> Reading:
-        """Where few steps could not tell, the same number again on the side where it gets better."""
-        if reading.says != "noise" or not reading.sweep.two_sided:
+        """Where few steps could not tell, or not of the component itself, as many again where it gets better."""
+        told = reading.says != "noise" and (reading.sweep.line.index is None or reading.own_scale)
+        if told or reading.says in ("plateau", "nothing") or not reading.sweep.two_sided or not reading.slope:
             return reading
         h, variation = reading.sweep.h, np.abs(np.diff(reading.sweep.off_central))
         below = np.nansum(variation[: len(variation) // 2]) < np.nansum(variation[len(variation) // 2 :])

@@ -22,7 +22,17 @@ def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
     Optional: scale, bounds (lower, upper), names, tighten(factor), active_set(p). `start` overrides the object's.
     A class, or a function that makes the object, is called first. Raises InputError for what is missing.
     """
-    thing = _made(thing, name)
+    try:
+        return _subject_of(_made(thing, name), name, start)
+    except InputError:
+        raise
+    except FOREIGN as failure:  # attributes may be properties, somebody else's code
+        raise InputError(
+            f"check: {name} cannot be looked at: {type(failure).__name__}: {failure} - mend it"
+        ) from failure
+
+
+def _subject_of(thing: Any, name: str, start: Any) -> Subject:
     objective, gradient = functions_of(thing, name)
     given = getattr(thing, "start", None) if start is None else start
     if given is None:
@@ -78,17 +88,20 @@ def subject(
     n_p = len(p)
     s = natural_scale(p) if scale is None else vector(scale, n_p, "scale")
     if not ((s > 0) & np.isfinite(s)).all():
-        raise InputError(f"check: scale[{int(np.flatnonzero(~(s > 0))[0]) if (s <= 0).any() else 0}] - give scales > 0")
+        i = int(np.flatnonzero(~((s > 0) & np.isfinite(s)))[0])
+        raise InputError(f"check: scale[{i}] = {s[i]:g} - give scales > 0 and finite")
     lower, upper = _bounds(bounds, n_p)
+    crossed = np.flatnonzero(~(lower < upper))
+    if crossed.size:
+        i = int(crossed[0])
+        raise InputError(f"check: bounds[{i}] = {lower[i]:g} to {upper[i]:g} - give (lower, upper), lower < upper")
     outside = np.flatnonzero((p < lower) | (p > upper))
     if outside.size:
         i = int(outside[0])
         raise InputError(
             f"check: start[{i}] = {p[i]:g} is outside its bounds {lower[i]:g} to {upper[i]:g} - start inside"
         )
-    if names is not None and len(names) != n_p:
-        raise InputError(f"check: {len(names)} names for {n_p} parameters - give one each")
-    label = default_label if names is None else (lambda i: str(names[i]))
+    label = default_label if names is None else _labels(names, n_p)
     made = Subject(name, objective, gradient, p, s, lower, upper, label=label)
 
     def tightened(factor: float) -> Subject:
@@ -102,6 +115,16 @@ def subject(
         tighten=tightened if callable(tighten) else None,
         active_set=active_set if callable(active_set) else None,
     )
+
+
+def _labels(names: Any, n_p: int) -> Callable[[int], str]:
+    try:
+        given = [str(name) for name in names]
+    except TypeError:
+        raise InputError(f"check: names={names!r} - give one name a parameter") from None
+    if isinstance(names, str) or len(given) != n_p:
+        raise InputError(f"check: {len(given)} names for {n_p} parameters - give one each")
+    return lambda i: given[i]
 
 
 def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:

@@ -146,8 +146,10 @@ def wrong_component(reading: Reading, subject: Subject) -> Worst:
     i, quotient = reading.sweep.line.index, reading.quotient
     assert i is not None
     assert quotient is not None
+    assert reading.level is not None
     w = float(subject.natural[i])
-    return Worst(subject.label(i), i, reading.slope / w, quotient / w)
+    found = quotient / w if abs(quotient) > reading.level.uncertainty else 0.0
+    return Worst(subject.label(i), i, reading.slope / w, found)
 
 
 def _sorted(worst: list[Worst], right: int = 0, everywhere: bool = False, slope: float | None = None) -> Located:

@@ -18,8 +18,9 @@ def noise(sweep: Sweep, eps: float, repeated: Array) -> float:
     """Standard deviation of one evaluation of J near p.
 
     The second difference J(p + h) - 2 J(p) + J(p - h) is truncation where h is large and has the variance 6 sigma^2
-    where it is small (Hamming 1973, chapter 6; More & Wild 2011): the least of its running medians counts, or what
-    `repeated` evaluations at p scatter by, or the spacing of floating-point numbers at J, if that is more.
+    where it is small (Hamming 1973, chapter 6; More & Wild 2011): the least of its running medians counts. Or, if that
+    is more, what `repeated` evaluations at p scatter by, or the rounding of J: to the spacing of floating-point
+    numbers, or to the least distance between any two values seen, which is larger where J is printed or cancels.
     """
     second = np.abs(sweep.jump * sweep.h)
     if not sweep.two_sided:  # a step is lost to the slope, which the gradient predicts
@@ -28,4 +29,7 @@ def noise(sweep: Sweep, eps: float, repeated: Array) -> float:
     count = min(WINDOW, len(visible))
     medians = [np.median(visible[k : k + count]) for k in range(len(visible) - count + 1)] if count > 2 else [0.0]
     scatter = float(np.std(repeated, ddof=1)) if len(repeated) > 1 else 0.0
-    return max(float(min(medians)) / (NORMAL * math.sqrt(6.0)), scatter, REPRESENTABLE * eps * abs(sweep.J))
+    seen = np.concatenate([sweep.J_plus, sweep.J_minus, [sweep.J]])
+    gaps = np.diff(np.unique(seen[np.isfinite(seen)]))
+    rounding = REPRESENTABLE * max(eps * abs(sweep.J), float(gaps.min(initial=np.inf)) if gaps.size else 0.0)
+    return max(float(min(medians)) / (NORMAL * math.sqrt(6.0)), scatter, rounding)

@@ -33,14 +33,17 @@ class Plan:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 0 < self.h_min < self.h_max < math.inf or self.h_max / self.h_min < 1e3:
-            raise InputError(f"steps from {self.h_min:g} to {self.h_max:g} - give 0 < least < largest, 3 decades apart")
+        if not LEAST_STEP <= self.h_min < self.h_max <= 1.0 / LEAST_STEP or self.h_max / self.h_min < 1e3:
+            raise InputError(
+                f"steps from {self.h_min:g} to {self.h_max:g} - give 0 < least < largest, 3 decades apart,"
+                f" {LEAST_STEP:g} at least"
+            )
         if not 2 <= self.per_decade <= 100:
             raise InputError(f"{self.per_decade} steps a decade - give 2 to 100")
         if not self.budget >= LEAST:
             raise InputError(f"a budget of {self.budget:g} calls - give at least {LEAST}")
-        if self.directions < 1:
-            raise InputError(f"{self.directions} random directions - give at least 1")
+        if not 1 <= self.directions <= MOST:
+            raise InputError(f"{self.directions} random directions - give at least 1, at most {MOST}")
         if self.seed < 0:
             raise InputError(f"seed {self.seed} - give a whole number >= 0")
 
@@ -58,5 +61,5 @@ class Plan:
         return np.asarray(steps[np.abs(np.log10(steps / nearest)) <= decades + 1e-9])
 
 
-LEAST = 20
+LEAST, LEAST_STEP, MOST = 20, 1e-100, 1000
 THOROUGH = Plan(h_min=1e-16, per_decade=4, components=1, directions=2, everywhere=True, budget=math.inf)

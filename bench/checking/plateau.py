@@ -13,6 +13,7 @@ from problems.problem import Array
 DECADE, NEARLY = 10.0 * (1.0 + 1e-9), 0.8  # steps are rounded, and need not divide a decade
 AT_LEAST = 3  # points that make a range
 NOISE = 3.0  # standard deviations
+SLOWEST = 0.95  # ratio of successive differences that is told from none
 DIFFERENT = 3.0  # uncertainties, of two ranges that contradict each other
 
 
@@ -59,8 +60,18 @@ def levels(h: Array, q: Array, noise: float) -> Iterator[Level]:
         values = q[first:last]
         middle = float(np.median(values))
         off = np.sort(np.abs(values - middle))
-        spread = float(off[-2] if len(off) >= 5 else off[-1])
+        spread = float(off[-2] if len(off) >= 5 else off[-1]) * _beyond(values)
         yield Level(middle, spread + NOISE * noise / float(h_min), float(h_min), float(h[last - 1]))
+
+
+def _beyond(values: Array) -> float:
+    """How much farther than they spread quotients may still go as h -> 0: a geometric series, where they all go one
+    way and their differences shrink slowly, as those of |p|^1.1 do."""
+    steps = np.diff(values)
+    if not ((steps > 0).all() or (steps < 0).all()):
+        return 1.0
+    ratio = abs(steps[0] / steps[-1]) ** (1.0 / (len(steps) - 1))
+    return float(1.0 / (1.0 - min(ratio, SLOWEST)))
 
 
 def _differ(a: Level, b: Level) -> bool:

@@ -19,7 +19,8 @@ from problems.problem import Array
 
 Says = Literal["agrees", "plateau", "kink", "noise", "nothing"]
 RESOLVED = 1e-3  # relative uncertainty of a quotient that can judge anything
-ZERO = 1e3 * float(np.finfo(np.float64).eps)  # of J, a slope that is rounding
+NEARER = 0.1  # the same of smaller steps that contradict larger ones
+ZERO = 1e3 * float(np.finfo(np.float64).eps)  # of what J changes by in natural steps, a slope that is rounding
 TINY = 1e-6  # relative jump of one-sided quotients that is no kink worth the name
 
 
@@ -46,7 +47,7 @@ class Reading:
         """Of quotient less slope: where its value is zero within its uncertainty, the gradient is right."""
         s = self.sweep
         q, noise = (s.off_central, self.noise / np.sqrt(2.0)) if s.two_sided else (s.off_forward, 1.5 * self.noise)
-        return level(s.h, q, noise, RESOLVED * self.size)
+        return level(s.h, q, noise, NEARER * self.size)
 
     @cached_property
     def slope(self) -> float:
@@ -65,14 +66,20 @@ class Reading:
         """What errors are relative to: a component's own slope where differences resolve it, else the gradient's.
 
         A random direction may meet a gradient at any angle: its errors are always relative to the gradient. Where that
-        is zero up to rounding in J, they are relative to J.
+        is zero up to rounding, as at a minimum, they are relative to what J changes by in natural steps.
         """
         own = abs(self.slope) if self.quotient is None else max(abs(self.slope), abs(self.quotient))
         known = self.level is not None and self.level.uncertainty <= RESOLVED * own
         if known and self.sweep.line.index is not None:
             return own
-        whole, J = max(self.size, own), abs(self.sweep.J)
-        return whole if whole > ZERO * J else J
+        whole = max(self.size, own)
+        return whole if whole > ZERO * self.change else self.change
+
+    @cached_property
+    def change(self) -> float:
+        """The largest |J(p +- h v) - J(p)| seen."""
+        seen = np.abs(np.concatenate([self.sweep.J_plus, self.sweep.J_minus]) - self.sweep.J)
+        return float(np.nanmax(seen)) if np.isfinite(seen).any() else 0.0
 
     @property
     def own_scale(self) -> bool:
@@ -101,7 +108,7 @@ class Reading:
         """Between one-sided slopes, where it is one; None where J is smooth as far as quotients tell."""
         if not self.sweep.two_sided:
             return None
-        found = level(self.sweep.h, self.sweep.jump, np.sqrt(6.0) * self.noise, RESOLVED * self.size)
+        found = level(self.sweep.h, self.sweep.jump, np.sqrt(6.0) * self.noise, NEARER * self.size)
         if found is None or abs(found.value) <= max(DIFFERENT * found.uncertainty, TINY * self.scale):
             return None
         return found
@@ -133,13 +140,14 @@ class Reading:
     def says(self) -> Says:
         if self.level is None:
             return "nothing"
-        if self.kink is not None or self.inside:
+        if (self.kink is not None and self.between) or (self.kink is None and self.inside):
             return "kink"
+        value, uncertainty = abs(self.level.value), self.level.uncertainty
         by_nature = min(self.by_nature, RESOLVED * self.size)
-        allowed = max(DIFFERENT * self.level.uncertainty, self.accepted * self.scale, by_nature)
-        if abs(self.level.value) > allowed:
+        if value > max(DIFFERENT * uncertainty, self.accepted * self.scale, by_nature):
             return "plateau"
-        return "agrees" if self.known_to <= RESOLVED else "noise"
+        nothing_changes = self.size == 0.0 == self.change
+        return "agrees" if uncertainty <= RESOLVED * self.scale or nothing_changes else "noise"
 
     # --- the curves a person looks at
 
@@ -169,11 +177,10 @@ def stencil_changes(subject: Subject, v: Array) -> Callable[[float], int] | None
         if not subject.inside(q):
             return None
         try:
-            found: Hashable | None = active_set(q)
-            hash(found)
+            found = active_set(q.copy())
+            return found if found is None else repr(np.asarray(found).tolist())
         except FOREIGN:
             return None
-        return found
 
     def changes(h: float) -> int:
         known = [found for t in (-1.0, 0.0, 1.0) if (found := at(subject.p + t * h * v)) is not None]

@@ -49,7 +49,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         upper=upper,
         closed=False,
         label=parameters.label,
-        tighten=lambda factor: subject(problem, route, _more(options), p, _tighter(solver, factor)),
+        tighten=lambda factor: subject(problem, route, _more(options, factor), p, _tighter(solver, factor)),
         active_set=_active_set(problem, solver),
         refine=_refined(problem, route, options, p, solver),
         exact=(lambda: exact(problem, p)) if Offers.LINEARIZE in offers else None,
@@ -69,10 +69,10 @@ def _tighter(solver: Solver, factor: float) -> Solver:
     return replace(solver, rtol=tight(solver.rtol, LEAST_RTOL), adjoint_rtol=adjoint_rtol, polish=1)
 
 
-def _more(options: Options) -> Options:
+def _more(options: Options, factor: float) -> Options:
     """An iterate's gradient comes nearer the solution's with more iterations, not with a tolerance."""
     k = options.get("iterations")
-    return options if k is None else options | {"iterations": 2 * k}
+    return options if k is None else options | {"iterations": round(k * factor**-0.3)}
 
 
 def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable] | None:

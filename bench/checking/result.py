@@ -34,6 +34,11 @@ class Tightened:
     gradient_moved: float
     quotient_moved: float
 
+    @property
+    def moved(self) -> bool:
+        """Whether tightening has changed anything."""
+        return self.gradient_moved > 0.0 or self.quotient_moved > 0.0
+
 
 @dataclass(frozen=True)
 class Refined:

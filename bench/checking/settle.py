@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from bench.accuracy import norm2
 from bench.checking.asked import Unusable
 from bench.checking.examine import Examination
 from bench.checking.guarded import FOREIGN
@@ -17,21 +19,34 @@ from problems.errors import RoutesError
 from problems.problem import Array
 
 FACTORS = (1e-3, 1e-6)  # of the forward tolerance
-FALLEN = 1.0 / 3.0
+FALLEN, STANDS = 1.0 / 3.0, 0.9  # of a plateau: it has fallen; it stands still
 BESIDE = 0.5  # decades on both sides of the best step, where a line is looked at once more
 SHRINKS = 0.6  # order in h from which on a plateau is one of the discretization
 EXACT = 1e-6  # relative: of adjoints by solves to 1e-12
 
 
-def fell(before: Reading, after: Reading) -> bool:
-    """Whether what stood in the way is gone, or on its way."""
-    if after.says == "agrees":
+def falls(before: Reading, tightened: Sequence[Tightened]) -> bool:
+    """Whether what stood in the way is gone when the solve is tightened, or still on its way down at the end."""
+    if not tightened:
+        return False
+    last = tightened[-1].reading
+    if last.says == "agrees":
         return True
-    return before.says == after.says == "plateau" and after.off < FALLEN * before.off
+    earlier = tightened[-2].reading if len(tightened) > 1 else before
+    plateaus = before.says == last.says == earlier.says == "plateau"
+    return plateaus and last.off < FALLEN * before.off and last.off < STANDS * earlier.off
+
+
+def moves(before: Reading, tightened: Sequence[Tightened]) -> bool:
+    """Whether it went down, but by less than would tell whose it is."""
+    if not tightened:
+        return False
+    earlier = tightened[-2].reading if len(tightened) > 1 else before
+    return earlier.says == "plateau" and tightened[-1].reading.off < STANDS * earlier.off
 
 
 def tighten(seen: Examination, reading: Reading) -> tuple[tuple[Tightened, ...], str | None]:
-    """The line of `reading` with a tighter forward solve, and a tighter one until what stood there falls.
+    """The line of `reading` with a tighter forward solve, and a tighter one until nothing stands there any more.
 
     And why that ended early, where it did.
     """
@@ -41,7 +56,7 @@ def tighten(seen: Examination, reading: Reading) -> tuple[tuple[Tightened, ...],
         if isinstance(again, str):
             return tuple(found), again
         found.append(again)
-        if fell(reading, again.reading):
+        if again.reading.says == "agrees":
             break
     return tuple(found), None
 
@@ -64,10 +79,10 @@ def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | st
     tight = other.read(line, h)
     if tight.says == "nothing":
         return f"J tightened by {factor:g} is not to be had along {line.name}"
-    moved = np.linalg.norm((other.gradient - seen.gradient) * seen.subject.natural)
+    moved = norm2((other.gradient - seen.gradient) * seen.subject.natural)
     quotients = reading.quotient, tight.quotient
     by = abs(quotients[0] - quotients[1]) if None not in quotients else float("nan")  # type: ignore[operator]
-    return Tightened(factor, tight, _relative(float(moved), seen.size), _relative(by, reading.scale))
+    return Tightened(factor, tight, _relative(moved, seen.size), _relative(by, reading.scale))
 
 
 def _relative(value: float, scale: float) -> float:
@@ -115,4 +130,4 @@ def _meets(exact: Array, reading: Reading) -> bool:
 def _off(seen: Examination, exact: Array) -> float:
     """|(g - exact) w| / |exact w|."""
     w = seen.subject.natural
-    return _relative(float(np.linalg.norm((seen.gradient - exact) * w)), float(np.linalg.norm(exact * w)))
+    return _relative(norm2((seen.gradient - exact) * w), norm2(exact * w))

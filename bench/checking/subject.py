@@ -72,7 +72,7 @@ def vector(values: Any, n_p: int | None, what: str) -> Array:
     """(n_p,) finite float64 from what a user gave, copied. Raises InputError."""
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"check: {what} is no array of real numbers ({error}) - give one of length n_p") from error
     if array.ndim == 0 and n_p is not None:
         array = np.full(n_p, float(array))

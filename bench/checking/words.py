@@ -65,11 +65,7 @@ def on_kink(check: Check, plateaus: Sequence[Reading]) -> Check:
     else:
         says = f"one-sided quotients {where} converge to numbers {reading.kink:.2g} apart, relative to them"
         says += f"; {inside}" if inside else ""
-    todo = "move p off the kink, or difference to one side of it only"
-    if reading.kink is not None and reading.between:
-        todo += ": the gradient lies between the slopes of the two sides"
-    elif reading.kink is not None:
-        todo += ": the gradient is neither of the two slopes nor between them"
+    todo = "move p off the kink, or difference to one side of it only: the gradient lies between the slopes of the two"
     if plateaus:
         worst = max(plateaus, key=lambda r: r.off)
         todo += f"; along {worst.sweep.line.name}, which is smooth, it is off by {worst.off:.2g} {_relative_to(worst)}"
@@ -118,6 +114,9 @@ def on_plateau(check: Check, verdict: Verdict) -> Check:
         if check.not_done:
             says += "; whether a tighter solve moves it was not seen"
             return replace(check, verdict=verdict, says=says, todo=f"mend this: {check.not_done[0]}", culprit=culprit)
+        if check.tightened and check.tightened[-1].moved:
+            says = says.replace("does not fall", "moves a little")
+            return replace(check, verdict=verdict, says=says, todo="tighten the solver farther", culprit=culprit)
         says += "; so small a plateau may be a loosely solved J as well as a small wrong term"
         return replace(check, verdict=verdict, says=says, todo=TIGHTEN, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
@@ -204,6 +203,8 @@ def _relative_to(reading: Reading) -> str:
 def _who_moved(check: Check) -> str:
     """Tightening tells which side was the loose one."""
     last = check.tightened[-1]
+    if last.reading.says != "agrees":
+        return "it is still falling"
     if last.gradient_moved < 0.1 * last.quotient_moved:
         return f"J moved, the gradient did not ({last.gradient_moved:.0e}): the gradient is sound, J is loosely solved"
     if last.quotient_moved < 0.1 * last.gradient_moved:

@@ -86,7 +86,7 @@ def check(
     plan = Plan(budget=budget, seed=seed)
     accepted(accept)
     subject = _subject(target, objective, gradient, problem, route, at, solver)
-    page_writable(html, kept)
+    page_writable(html, [kept, target, objective, gradient, problem, route, at])
     writable(kept)
     with stdout_to_stderr():
         found = check_subject(subject, plan, accept)
@@ -112,6 +112,8 @@ def _subject(
         spec = one_route(route)
         made, p = built(one_problem(problem), at)
         return subject(made, spec.route, spec.options, p, solver)
+    if at == "true":
+        raise InputError("check: --at true is for registered problems with synthetic data - give a file")
     start = None if at == "start" else _column(at)
     if target is not None:
         return foreign.subject_of(imported(target), target, start)
@@ -138,11 +140,12 @@ def _contract(problem: str | None, route: str | None, at: str, solver: Solver, a
     from bench.rows import clean
 
     made, p = built(one_problem(problem or "bar"), at)
-    if route is not None:
-        spec = one_route(route)
-        found = of_route(made, p, spec.route, spec.options, solver)
-    else:
-        found = of_problem(made, p, [spec.route for spec in case.routes(["all"])], solver)
+    with stdout_to_stderr():
+        if route is not None:
+            spec = one_route(route)
+            found = of_route(made, p, spec.route, spec.options, solver)
+        else:
+            found = of_problem(made, p, [spec.route for spec in case.routes(["all"])], solver)
     if as_json:
         findings = [vars(f) | {"sound": f.sound} for f in found.findings]
         click.echo(json.dumps(clean({"name": found.name, "findings": findings}), allow_nan=False))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,13 @@ from bench.commands.shared import at_option, checked, debug_option, solver_optio
 from bench.commands.studying import no_plot_option, now, one_problem, writable
 from bench.commands.verdict import built, conclude, one_route, page_writable
 from bench.foreign_output import stdout_to_stderr
-from problems.errors import InputError
+from problems.errors import InputError, NotConverged, SingularMatrix
 
 if TYPE_CHECKING:
     from problems.problem import Problem
     from routes.newton import Solver
 
+LONGEST = 12  # digits of a number that are read
 FEW = 3  # components, where nobody says how many
 COMPONENTS = "So many components by sensitivity, or these: 2,5..7 [element min(3, M) of the bar; 3 elsewhere]."
 BUDGET = "Refuse what is predicted to take more seconds; inf forces it."
@@ -73,8 +75,9 @@ def vcurve(
     few = _default(made) if components is None else _components(components, len(p))
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     looked_at = subject(made, route_spec.route, route_spec.options, p, solver)
-    _refuse_beyond(budget, price_of(lambda: looked_at.objective(p))[0], plan)
-    page_writable(html, kept)
+    with suppress(NotConverged, SingularMatrix):  # a solve that fails is part of the verdict
+        _refuse_beyond(budget, price_of(lambda: looked_at.objective(p))[0], plan)
+    page_writable(html, [kept, problem, route, at])
     writable(kept)
     with stdout_to_stderr():
         found = check(looked_at, plan)
@@ -98,9 +101,14 @@ def _components(text: str, n_p: int) -> int | tuple[int, ...]:
         first, dots, last = item.strip().partition("..")
         if not first.isdecimal() or (dots and not last.isdecimal()):
             raise InputError(f"--components {text}: {item!r} is no number - write 3 (how many) or 2,5..7 (which)")
-        numbers += range(int(first), int(last or first) + 1)
+        start, stop = (int(number[:LONGEST]) for number in (first, last or first))
+        if start > stop or (("," in text or dots) and stop > n_p):
+            raise InputError(f"--components {text}: {item.strip()} is not within 1 to {n_p} - choose among them")
+        numbers += range(start, stop + 1)
     if "," not in text and ".." not in text:
-        return min(numbers[0], n_p)
+        if not 1 <= numbers[0] <= n_p:
+            raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")
+        return numbers[0]
     outside = [i for i in numbers if not 1 <= i <= n_p]
     if outside or not numbers:
         raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,10 @@ import click
 
 from bench.commands.shared import complain
 from bench.commands.studying import keep
-from problems.errors import InputError
+from bench.foreign_output import stdout_to_stderr
+from problems.errors import InputError, RoutesError
+
+LOST = 2  # exit code where the page asked for could not be written
 
 if TYPE_CHECKING:
     from bench.case import ProblemSpec, RouteSpec
@@ -31,20 +35,26 @@ def one_route(selector: str) -> RouteSpec:
 def built(spec: ProblemSpec, at: str) -> tuple[Problem, Array]:
     """The problem and the point p. Raises InputError for a factory that fails in its own way."""
     from bench import case
+    from bench.checking.guarded import FOREIGN
 
     try:
-        problem = spec()
-    except (TypeError, ValueError, ArithmeticError, LookupError, AttributeError) as error:
-        raise InputError(f"problem '{spec.name}' cannot be built: {type(error).__name__}: {error} - mend it") from error
+        with stdout_to_stderr():
+            problem = spec()
+    except RoutesError:
+        raise
+    except FOREIGN as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"problem '{spec.name}' cannot be built: {type(error).__name__}: {said} - mend it") from error
     return problem, case.point(problem, at)
 
 
-def page_writable(html: Path | None, kept: Path | None) -> None:
-    """Raise InputError now rather than after all is measured."""
+def page_writable(html: Path | None, taken: Iterable[Path | str | None]) -> None:
+    """Raise InputError now rather than after all is measured, and for a page that would replace what is read."""
     from bench.files import check_writable
 
     if html is not None:
-        check_writable("--html", html, [] if kept is None else [kept])
+        files = [Path(str(name).partition(":")[0].partition("[")[0]) for name in taken if name is not None]
+        check_writable("--html", html, files)
 
 
 def conclude(
@@ -64,8 +74,7 @@ def conclude(
     from bench.checking.rows import rows
     from bench.rows import clean
 
-    if html is not None:
-        _write_page(check, html)
+    lost = html is not None and not _write_page(check, html)
     if as_json:
         click.echo(json.dumps(clean(check.as_dict()), allow_nan=False))
     else:
@@ -74,15 +83,17 @@ def conclude(
 
         show_check(console(), check, curves=not no_plot)
     keep(kept, rows(check, what), started, quiet=as_json)
-    if html is not None:
+    if html is not None and not lost:
         click.echo(f"page in {html}", err=as_json)
-    return check.exit_code
+    return LOST if lost else check.exit_code
 
 
-def _write_page(check: Check, html: Path) -> None:
+def _write_page(check: Check, html: Path) -> bool:
     from bench.views.page import page
 
     try:
         html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         complain(f"--html {html}: {error.strerror or error} - name a file you may write")
+        return False
+    return True
