@@ -207,10 +207,9 @@ def test_the_textbook_kink() -> None:
     assert "lies between the slopes" in found.todo
 
 
-def test_a_gradient_outside_both_slopes_is_told_so() -> None:
+def test_a_gradient_outside_both_slopes_of_a_kink_is_wrong() -> None:
     found = check(kinked, lambda p: -7.0 * kinked_gradient(p) - 3.0, np.array([1.0, 0.0, 2.0]), scale=np.ones(3))
-    assert found.verdict == "non-smooth"
-    assert "neither of the two slopes" in found.todo or "is off by" in found.todo
+    assert found.verdict == "wrong-gradient"
 
 
 @pytest.mark.parametrize("active_set", [lambda p: 1 / 0, lambda p: [1, 2], lambda p: None])
@@ -247,7 +246,7 @@ def loosely(tolerance: float):
 
     def solve(p: Array) -> Array:
         x = np.ones_like(p)
-        while np.abs(x * x - p).max() > max(tolerance, 1e-15):
+        while np.abs(x * x - p).max() > max(tolerance, 1e-14):
             x = x - (x * x - p) / (4.0 * x)
         return x
 
@@ -290,7 +289,7 @@ class Warm:
         self.tolerance, self.x = tolerance, np.ones(2)
 
     def objective(self, p: Array) -> float:
-        while np.abs(self.x**2 - p).max() > max(self.tolerance, 1e-15):
+        while np.abs(self.x**2 - p).max() > max(self.tolerance, 1e-14):
             self.x = self.x - (self.x**2 - p) / (4.0 * self.x)
         return float((self.x**3).sum())
 

@@ -20,7 +20,8 @@ def noise(sweep: Sweep, eps: float, repeated: Array) -> float:
     The second difference J(p + h) - 2 J(p) + J(p - h) is truncation where h is large and has the variance 6 sigma^2
     where it is small (Hamming 1973, chapter 6; More & Wild 2011): the least of its running medians counts. Or, if that
     is more, what `repeated` evaluations at p scatter by, or the rounding of J: to the spacing of floating-point
-    numbers, or to the least distance between any two values seen, which is larger where J is printed or cancels.
+    numbers, or, where steps leave J as it is to the last digit, to the least distance between any two values seen:
+    that is larger where J is printed or cancels.
     """
     second = np.abs(sweep.jump * sweep.h)
     if not sweep.two_sided:  # a step is lost to the slope, which the gradient predicts
@@ -31,5 +32,6 @@ def noise(sweep: Sweep, eps: float, repeated: Array) -> float:
     scatter = float(np.std(repeated, ddof=1)) if len(repeated) > 1 else 0.0
     seen = np.concatenate([sweep.J_plus, sweep.J_minus, [sweep.J]])
     gaps = np.diff(np.unique(seen[np.isfinite(seen)]))
-    rounding = REPRESENTABLE * max(eps * abs(sweep.J), float(gaps.min(initial=np.inf)) if gaps.size else 0.0)
+    still = np.count_nonzero(seen == sweep.J) > 1  # J itself is one of them
+    rounding = REPRESENTABLE * max(eps * abs(sweep.J), float(gaps.min()) if gaps.size and still else 0.0)
     return max(float(min(medians)) / (NORMAL * math.sqrt(6.0)), scatter, rounding)
