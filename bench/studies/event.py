@@ -11,6 +11,8 @@ from bench.studies.ray import Ray
 
 Side = Literal["left", "right"]
 NOTHING = 1e-13  # of the terms of a slope: its rounding
+EXACT = 1e-10  # relative error of a gradient on its branch
+NEAR = 1.05  # a factor on s that stays near the event
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from bench.accuracy import Judge, Judges
 from bench.bill import prices, unaffordable
 from bench.case import RouteSpec
-from bench.studies.event import Event, Kink, Side, Slope, Stencil, Visit
+from bench.studies.event import NEAR, Event, Kink, Side, Slope, Stencil, Visit
 from bench.studies.ray import Gradients, Ray, bisect
 from problems.errors import InputError, RoutesError
 from problems.problem import Offers, Problem
@@ -24,8 +24,7 @@ from routes.route import Route
 
 ONE_SIDED = float(np.finfo(np.float64).eps) ** 0.5  # step of one-sided quotients, relative to s
 STENCILS = tuple(10.0**-k for k in range(1, 8))  # steps over the event, relative to s: it is known to 1e-12
-NEAR, NEARBY = 1.05, 24  # from s / NEAR to s NEAR so many more visits, to see the event from near
-EXACT = 1e-10  # relative error of a gradient on its branch
+NEARBY = 24  # visits from s / NEAR to s NEAR, to see the event from near
 CHOICES = (
     "choose a problem that has, bar[stop=penalty] or bar[stop=multiplier] say, or one rounded, bar[stop=softplus] or"
     " bar[stop=quadratic]"

@@ -6,10 +6,10 @@ from collections.abc import Hashable
 
 from bench.case import RouteSpec
 from bench.rows import Row
+from bench.selector import written
 from bench.studies.event import Kink
 from bench.studies.rounding import Trade, width_of
 from bench.study_rows import KINK
-from bench.views.format import selector
 
 EMPTY: Row = dict.fromkeys((c.name for c in KINK), None)
 
@@ -117,7 +117,7 @@ def _status(reason: str | None, otherwise: str = "failed") -> Row:
 
 def named(spec: RouteSpec) -> str:
     """The route's selector."""
-    return selector(spec.route.name, spec.options, spec.route.defaults)
+    return written(spec.route.name, spec.options, spec.route.defaults)
 
 
 def word(active_set: Hashable | None) -> str | None:

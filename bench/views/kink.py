@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from bench.studies.event import Kink, Slope, in_words
-from bench.studies.kink import EXACT, NEAR
+from bench.studies.event import EXACT, NEAR, Kink, Slope, in_words
 from bench.studies.kink_rows import named
 from bench.studies.rounding import Trade, Traded, width_of
 from bench.views.format import number
