@@ -16,7 +16,7 @@ from problems.sparse import BlockDiagonal
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.factorization import Factorizer, to_tolerance
-from routes.iterative import ROUNDING
+from routes.iterative import AT_MOST, ROUNDING
 from routes.model import Model
 from routes.newton import Solver
 from routes.refinement import LinearizedSolver
@@ -73,7 +73,8 @@ def test_what_stalls_says_how_far_it_came() -> None:
 
 
 @pytest.mark.parametrize("kind", sorted(INDEFINITE))
-def test_descent_on_an_indefinite_matrix_is_right_or_one_line(kind: str) -> None:
+def test_descent_on_an_indefinite_matrix_is_right_or_one_line(monkeypatch, kind: str) -> None:
+    monkeypatch.setitem(AT_MOST, "descent", 10_000)
     A = MATRICES[kind]
     b = np.random.default_rng(7).standard_normal(SIZES.get(kind) or A.shape[0])
     try:
