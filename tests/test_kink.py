@@ -205,7 +205,7 @@ def test_routes_that_cannot_run_are_skipped_with_their_reason(cli) -> None:
 def test_no_event_is_one_line(cli) -> None:
     for problem, low, says in (
         ("bar[stop=penalty]", "2", "stays open"),
-        ("bar[stop=multiplier,gap=-0.1]", "1", "closed"),
+        ("bar[stop=multiplier,gap=-0.1]", "1", "stays closed"),
     ):
         ran = run(cli, problem, "--range", low, "4", "--no-store")
         assert (ran.code, ran.err, ran.out.count("\n")) == (0, "", 1)

@@ -62,8 +62,8 @@ def test_partial_derivatives_hold_on_every_branch(stop: str, penetration: float)
     traced = bar.traced()
     by_jax = jax.jvp(lambda u: traced.residual(u, p), (u,), (du,))[1]
     np.testing.assert_allclose(by_jax, by_complex_step, rtol=1e-12, atol=1e-13)
-    if bar.active_set(u, p) is not None:
-        assert bar.active_set(u, p) == ("closed" if penetration > 0 else "open")
+    branch = "closed" if penetration > 0 else "open"
+    assert bar.active_set(u, p) == (None if stop in ("softplus", "quadratic") else branch)
 
 
 def test_exact_contact_holds_signorini_s_conditions() -> None:
@@ -116,7 +116,7 @@ def test_the_tail_is_blind_until_the_tip_meets_the_stop(route: Route, n: int, st
         assert result.gradient[:5].all()
         assert result.gradient[5:].all() if touched else not result.gradient[5:].any()
         assert bar.view(p, result.u, result.lam).blind.tolist() == [False] * 5 + [not touched] * (n - 5)
-        assert not bar.reference(p).gradient[5:].any() or touched
+        assert bar.reference(p).gradient[5:].any() == touched
 
 
 def test_notes_say_what_is_blind_and_when() -> None:
