@@ -14,9 +14,9 @@ from bench.study_rows import KINK
 EMPTY: Row = dict.fromkeys((c.name for c in KINK), None)
 
 
-def rows(kink: Kink | None, trade: Trade | None, what: Row) -> list[Row]:
+def rows(kink: Kink, trade: Trade | None, what: Row) -> list[Row]:
     """Rows of what was measured; `what` holds problem and at."""
-    measured = ([] if kink is None else of_kink(kink)) + ([] if trade is None else of_trade(trade))
+    measured = of_kink(kink) + ([] if trade is None else of_trade(trade))
     return [EMPTY | what | row for row in measured]
 
 
