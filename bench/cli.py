@@ -29,14 +29,15 @@ from bench.commands.shared import (
 from bench.commands.tolerance import tolerance
 from bench.commands.unrolling import unrolling
 from bench.commands.vcurve import vcurve
-from problems.errors import DomainError, InputError
+from problems.errors import DomainError, InputError, RoutesError
 
 if TYPE_CHECKING:
     from bench.rows import Row
     from bench.runner import Outcome, View
     from routes.newton import Solver
 
-WRONG_USAGE, INTERRUPTED = 2, 130
+FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+KEEPING = ("run", "tolerance")  # verbs that an interrupt does not rob of what they have
 SHOWN = "-"  # --gradient without a file
 
 
@@ -47,18 +48,18 @@ class Routes(click.Group):
         mend_streams()
         try:
             return super().invoke(ctx)
-        except (InputError, DomainError) as error:
+        except RoutesError as error:
             if debugging():
                 traceback.print_exc()
             complain(str(error))
-            ctx.exit(WRONG_USAGE)
+            ctx.exit(WRONG_USAGE if isinstance(error, InputError | DomainError) else FAILED)
         except click.UsageError as error:
             about = error.ctx.command_path if error.ctx else "routes"
             complain(f"{error.format_message()} - see {about} --help")
             ctx.exit(WRONG_USAGE)
         except KeyboardInterrupt:
-            what = "finished cases are printed, and kept unless --no-store"
-            complain(f"interrupted - {what if ctx.invoked_subcommand == 'run' else 'nothing is kept'}")
+            what = "what is finished is printed, and kept unless --no-store"
+            complain(f"interrupted - {what if ctx.invoked_subcommand in KEEPING else 'nothing is kept'}")
             leave(INTERRUPTED)
         except BrokenPipeError:
             raise  # click ends quietly: whoever read has read enough

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 from problems.errors import InputError
 
@@ -46,3 +47,14 @@ def parse(text: str) -> Selector:
         if not key or "" in values.split("|"):
             raise InputError(f"selector '{text}': empty value or name in '{key}={values}' - write key=value or key=a|b")
     return Selector(name, {key: [v.strip() for v in values.split("|")] for key, values in grid.items()})
+
+
+def _exact(value: Any) -> str:
+    """As short as it can be read back; other values need other names."""
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+def written(name: str, options: dict[str, Any], defaults: dict[str, Any]) -> str:
+    """`name[key=value]` with what differs from the defaults; `parse` reads it."""
+    shown = [f"{key}={_exact(value)}" for key, value in options.items() if value != defaults.get(key)]
+    return f"{name}[{','.join(shown)}]" if shown else name

@@ -147,9 +147,9 @@ class Bar(Problem):
         if self.stop is None:
             return F, 0.0
         g_0, gap = F * C - self.stop.gap, self.stop.gap
-        g, kappa = self.stop.in_series(g_0, C)
-        q = (g_0 - g) / C
-        T = F - q if 2.0 * q < F else (g + gap) / C  # u_N / C: where the stop carries nearly all, F - q cancels
+        g, q, kappa = self.stop.in_series(g_0, C)
+        balance = (F + q) * abs(g + gap) <= (abs(g) + abs(gap)) * abs(F - q)  # which of the two differences loses less
+        T = F - q if balance else (g + gap) / C
         return T, -kappa * T
 
     def modulus(self, p: Any, xp: Any = np) -> Any:

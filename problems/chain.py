@@ -73,6 +73,10 @@ class Chain:
         """An upper bound of |K|_inf, at most twice too large."""
         return 4.0 * float(np.abs(self.D).max()) + float(abs(self.tip))
 
+    @property
+    def nbytes(self) -> int:
+        return int(self.D.nbytes)
+
 
 @dataclass(frozen=True)
 class Bordered:
@@ -103,6 +107,10 @@ class Bordered:
     def norm(self) -> float:
         """An upper bound of |A|_inf."""
         return self.chain.norm + 1.0 if self.active else max(self.chain.norm, 1.0 / self.c)
+
+    @property
+    def nbytes(self) -> int:
+        return int(self.D.nbytes)
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,10 @@ class SymmetricSparse:
         rows = abs(self.upper) @ np.ones(self.pattern.n) + abs(self.upper).T @ np.ones(self.pattern.n)
         return float((rows - abs(self.diagonal)).max())
 
+    @property
+    def nbytes(self) -> int:
+        return int(self.data.nbytes)
+
 
 @dataclass(frozen=True, eq=False)
 class GeneralPattern:
@@ -140,6 +144,10 @@ class GeneralSparse:
     def norm(self) -> float:
         """|A|_inf."""
         return float((abs(self.rows) @ np.ones(self.pattern.n)).max())
+
+    @property
+    def nbytes(self) -> int:
+        return int(self.data.nbytes)
 
 
 @dataclass(frozen=True, eq=False)

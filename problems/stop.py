@@ -21,9 +21,9 @@ GAP, K_C, WIDTH = 0.8, 100.0, 0.01  # [m] the bar at E = 1 reaches 1; [N/m]; [m]
 
 
 class Law(Protocol):
-    """q(g), convex and increasing; the real part of a complex g chooses the branch. xp: numpy or jax.numpy.
+    """q(g), convex, increasing and nowhere below the penalty; the real part of a complex g chooses the branch.
 
-    k_c [N/m] is the stiffness far beyond the gap.
+    k_c [N/m] is the stiffness far beyond the gap. xp: numpy or jax.numpy.
     """
 
     @property
@@ -132,17 +132,18 @@ class Compliant:
     def active_set(self, u: Array) -> str | None:
         return self.law.branch(u[-1] - self.gap)
 
-    def in_series(self, g_0: Any, C: Any) -> tuple[Any, Any]:
-        """g and kappa = k / (1 + k C) of a bar of compliance C [m/N] that would reach g_0 if nothing stopped it.
+    def in_series(self, g_0: Any, C: Any) -> tuple[Any, Any, Any]:
+        """g, q and kappa = k / (1 + k C) of a bar of compliance C [m/N] that would reach g_0 if nothing stopped it.
 
-        g + C q(g) = g_0, hence dq/dC = kappa (F - q) under the load F. By Newton's method from g_0, where it
-        falls to the solution, q being convex; exact for the penalty.
+        g + C q(g) = g_0, hence dq/dC = kappa (F - q) under the load F. By Newton's method from the penalty's g, from
+        where it falls to the solution, q being convex and above the penalty.
         """
-        g, g_next = np.inf, g_0
+        g, g_next = np.inf, g_0 / (1.0 + C * self.law.k_c) if g_0 > 0.0 else g_0
         while g_next < g:
             g, k = g_next, self.law.stiffness(g_next)
             g_next = (g_0 + C * (k * g - self.law.force(g))) / (1.0 + C * k)
-        return g, k / (1.0 + C * k)
+        q = self.law.force(g) if k * C < 1.0 else (g_0 - g) / C  # where rounding of g matters less
+        return g, q, k / (1.0 + C * k)
 
 
 @dataclass(frozen=True)
@@ -182,9 +183,9 @@ class Rigid:
     def active_set(self, u: Array) -> str | None:
         return "closed" if self.touched(u) else "open"
 
-    def in_series(self, g_0: Any, C: Any) -> tuple[Any, Any]:
+    def in_series(self, g_0: Any, C: Any) -> tuple[Any, Any, Any]:
         """The limit of Compliant's as k grows beyond bounds."""
-        return (0.0 * C, 1.0 / C) if g_0 > 0.0 else (g_0, 0.0 * C)
+        return (0.0 * C, g_0 / C, 1.0 / C) if g_0 > 0.0 else (g_0, 0.0 * C, 0.0 * C)
 
 
 Stop = Compliant | Rigid

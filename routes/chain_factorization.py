@@ -21,7 +21,7 @@ class ChainFactorization:
     def __init__(self, K: Chain, who: str) -> None:
         check_positive(K.D, who)
         self.D, self.tip = K.D, K.tip
-        self.norm, self.nbytes = K.norm, K.D.nbytes
+        self.norm, self.nbytes = K.norm, K.nbytes
 
     def solve(self, b: Array) -> Array:
         if not self.tip:
@@ -46,7 +46,7 @@ class BorderedFactorization:
     def __init__(self, A: Bordered, who: str) -> None:
         check_positive(A.D, who)
         self.D, self.c, self.active = A.D, A.c, A.active
-        self.norm, self.nbytes = A.norm, A.D.nbytes
+        self.norm, self.nbytes = A.norm, A.nbytes
 
     def solve(self, b: Array) -> Array:
         if not self.active:

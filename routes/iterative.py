@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from problems.chain import Chain
+from problems.chain import Bordered, Chain
 from problems.errors import NotConverged
 from problems.problem import Array
 from problems.sparse import GeneralSparse, SymmetricSparse
@@ -27,6 +27,7 @@ NAMES = {
     ("descent", False): "minimal residuals",
 }
 SOUND = 1e-6  # |b - A x| / |b| that rounding may leave: beyond, x is large because A is singular
+GROWN = 1.0 / np.finfo(np.float64).eps  # of |r|_2^2 over |b|_2^2: cond(A) where A is positive definite, at most
 STILL = 1.0 - 1e-6  # of |r|_2, before a restart
 ROUNDING = 16.0 * np.finfo(np.float64).eps  # |b - A x| <= ROUNDING |A| |x|: no iteration can do better
 
@@ -37,21 +38,20 @@ class IterativeFactorization:
     krylov   conjugate gradients (Hestenes & Stiefel 1952) where A is symmetric; where that turns out indefinite, or A
              is general, GMRES (in the simpler form of Walker & Zhou 1994, restarted)
     descent  the same without memory: steepest descent (Cauchy 1847) and minimal residuals. Slow, but evenly so on few
-             unknowns, where conjugate gradients are off until the n-th step and exact from there on
+             unknowns, where conjugate gradients are off until the n-th step and exact from there on. Indefinite A it
+             rarely solves
 
     solve raises NotConverged.
     """
 
     def __init__(self, A: Any, who: str, kind: Kind, rtol: float) -> None:
         self._who, self._kind, self.rtol = who, kind, rtol
-        self._symmetric = isinstance(A, Chain | SymmetricSparse) or (
-            isinstance(A, np.ndarray) and bool((A == A.T).all())
-        )
+        self._symmetric = A.T is A or (isinstance(A, np.ndarray) and bool((A == A.T).all()))
         self.name = NAMES[kind, self._symmetric]
-        known = isinstance(A, Chain | SymmetricSparse | GeneralSparse)
+        known = isinstance(A, Chain | Bordered | SymmetricSparse | GeneralSparse)
         self.norm = float(A.norm if known else abs(A).sum(axis=1).max())
+        self.nbytes = int((A if known else A.data).nbytes)
         self._A = A.full().tocsr() if isinstance(A, SymmetricSparse) else A
-        self.nbytes = int((A.D if isinstance(A, Chain) else A.data).nbytes)
 
     def to(self, rtol: float) -> IterativeFactorization:
         """The same matrix, solved to another tolerance."""
@@ -82,23 +82,25 @@ class IterativeFactorization:
             size = _norm(r)
             enough = max(wanted, min(sound, ROUNDING * self.norm * _norm(x)))
         if not size <= enough:
-            raise NotConverged(
-                f"{self._who}: {self.name}: |b - A x| = {size / _norm(b):.2g} |b| after {products} products, wanted"
-                f" {self.rtol:.2g} - loosen the tolerance or take --linear-solver auto",
-                (),
-            )
+            came = f"|b - A x| = {size / _norm(b):.2g} |b| after {products} products, wanted {self.rtol:.2g}"
+            name = NAMES[self._kind, symmetric]  # that it ended with
+            raise NotConverged(f"{self._who}: {name}: {came} - loosen the tolerance or take --linear-solver auto", ())
         return x
 
 
 def _conjugate_gradients(A: Any, b: Array, wanted: float, at_most: int, memory: bool) -> tuple[Array | None, int]:
-    """x with |r|_inf <= wanted, r the residual carried along, and the products taken; None where A is indefinite."""
+    """x with |r|_inf <= wanted, r the residual carried along, and the products taken; None where A is indefinite.
+
+    That shows in a direction's energy, or in an |r| that grows as no minimum of the energy lets it.
+    """
     x, r, d = np.zeros_like(b), b, b
     rr, k = _dot(r, r), 0
+    bound = GROWN * abs(rr)
     while _norm(r) > wanted and k < at_most:
         Ad = A @ d
         k += 1
         energy = _dot(d, Ad)
-        if not energy.real > 0.0:
+        if not (energy.real > 0.0 and abs(rr) <= bound):
             return None, k
         alpha = rr / energy
         x, r = x + alpha * d, r - alpha * Ad

@@ -18,7 +18,7 @@ from routes.tally import Work
 STEP_LENGTHS = tuple(0.5**i for i in range(9))
 DESCENT = 1e-4  # of |R|, times the step length, for a step to be taken
 ROUNDING = 16.0 * np.finfo(np.float64).eps  # |R| <= ROUNDING |R_u| (|u| + |X|): no iteration can do better
-
+CANCELLED = 1e4  # |u| / |u - du| beyond which u - du has lost digits that |R| need not show
 LAST = 8  # iterates that a report shows
 
 Newton = Literal["full", "inexact"]
@@ -96,7 +96,8 @@ def newton(
     a warm start is never returned untouched and the factors are those of the neighbourhood; after convergence,
     `polish` more. Without line search a is 1 and |R| may rise. Where R is smooth in pieces, a small |R| counts only on
     the piece that the step was made for, as |R_u| of a stiff penalty makes everything rounding; or where |R| was small
-    before, too, as at a kink. Returns u, the history of |R|_inf and the scale. Raises NotConverged with the history.
+    before, too, as at a kink. An iterate in which much cancelled is followed by another: |R| of a soft structure does
+    not feel what was lost. Returns u, the history of |R|_inf and the scale. Raises NotConverged with the history.
     """
     R = step.residual(u)
     history, sets = [norm(R)], [step.active_set(u)]
@@ -110,6 +111,7 @@ def newton(
             rounding = ROUNDING * norm_of_R_u * (norm(u_next) + step.offset)
             small = norm(R_next) <= max(solver.rtol * scale, rounding) and set_next == sets[-1]
             small |= max(norm(R_next), history[-1]) <= solver.rtol * scale
+            small &= norm(u) <= CANCELLED * (norm(u_next) + step.offset)
             lower = norm(R_next) <= (1.0 - DESCENT * a) * history[-1]
             if small or lower or (not step.line_search and math.isfinite(norm(R_next))):
                 break

@@ -10,13 +10,13 @@ from test_factorization import BLOCK, PATTERN, START, entries
 
 from problems.bar import Bar
 from problems.block import Block
-from problems.chain import Chain
+from problems.chain import Bordered, Chain
 from problems.errors import NotConverged
 from problems.sparse import BlockDiagonal
 from routes.adjoint import adjoint
 from routes.complex_step import complex_step
 from routes.factorization import Factorizer, to_tolerance
-from routes.iterative import ROUNDING
+from routes.iterative import AT_MOST, ROUNDING
 from routes.model import Model
 from routes.newton import Solver
 from routes.refinement import LinearizedSolver
@@ -29,6 +29,9 @@ K = BLOCK.tangent(np.zeros(BLOCK.n_state), START)
 GENERAL = PATTERN.assemble(entries(float))
 MATRICES = {
     "chain": Chain(ROUGH[:16]),
+    "chain, spring": Chain(ROUGH[:16], 5.0),
+    "chain, multiplier": Bordered(ROUGH[:16], 1.0, True),
+    "chain, free": Bordered(ROUGH[:16], 2.0, False),
     "symmetric": K,
     "dense": np.diag(ROUGH) + 0.1,
     "dense, general": np.diag(ROUGH) + 0.01 * RNG.standard_normal((40, 40)),
@@ -38,8 +41,9 @@ MATRICES = {
     "blocks": BlockDiagonal((K, K)),
     "complex": np.diag(ROUGH * (1 + 0.1j)) + 0.1,
 }
-WANT_DEFINITE = {"general", "indefinite"}  # what minimal residuals cannot do
-PAIRS = [("krylov", kind) for kind in MATRICES] + [("descent", kind) for kind in MATRICES if kind not in WANT_DEFINITE]
+SIZES = {"chain": 16, "chain, spring": 16, "chain, multiplier": 17, "chain, free": 17}
+INDEFINITE = {"general", "indefinite", "chain, multiplier", "chain, free"}  # what minimal residuals cannot do
+PAIRS = [("krylov", kind) for kind in MATRICES] + [("descent", kind) for kind in MATRICES if kind not in INDEFINITE]
 
 
 @pytest.mark.parametrize("rtol", [1e-1, 1e-4, 1e-11])
@@ -47,10 +51,10 @@ PAIRS = [("krylov", kind) for kind in MATRICES] + [("descent", kind) for kind in
 def test_they_end_at_the_tolerance(linear_solver, kind: str, rtol: float) -> None:
     A = MATRICES[kind]
     factors = Factorizer(linear_solver, rtol)(A, "test")
-    b = np.random.default_rng(7).standard_normal(16 if kind == "chain" else A.shape[0])
+    b = np.random.default_rng(7).standard_normal(SIZES.get(kind) or A.shape[0])
     for left in (b - A @ factors.solve(b), b - A.T @ factors.solve_transposed(b)):
         assert abs(left).max() <= rtol * abs(b).max()
-        if kind != "chain" and rtol > 1e-6:  # conjugate gradients jump there; GMRES near its last direction
+        if kind not in SIZES and rtol > 1e-6:  # conjugate gradients jump there; GMRES near its last direction
             assert abs(left).max() > 1e-3 * rtol * abs(b).max(), "solved further than asked"
     tight = to_tolerance(factors, 1e-12)
     x = tight.solve(b)
@@ -62,12 +66,40 @@ def test_they_end_at_the_tolerance(linear_solver, kind: str, rtol: float) -> Non
 
 def test_what_stalls_says_how_far_it_came() -> None:
     singular = np.diag([1.0, 1.0, 0.0])
-    with pytest.raises(
-        NotConverged, match=r"test: conjugate gradients: \|b - A x\| = .* - loosen the tolerance or take"
-    ):
+    with pytest.raises(NotConverged, match=r"test: GMRES: \|b - A x\| = .* - loosen the tolerance or take"):
         Factorizer("krylov")(singular, "test").solve(np.ones(3))
     with pytest.raises(NotConverged, match=r"test: minimal residuals: "):
         Factorizer("descent")(np.array([[0.0, 1.0], [-1.0, 0.0]]), "test").solve(np.ones(2))
+
+
+@pytest.mark.parametrize("kind", sorted(INDEFINITE))
+def test_descent_on_an_indefinite_matrix_is_right_or_one_line(monkeypatch, kind: str) -> None:
+    monkeypatch.setitem(AT_MOST, "descent", 10_000)
+    A = MATRICES[kind]
+    b = np.random.default_rng(7).standard_normal(SIZES.get(kind) or A.shape[0])
+    try:
+        left = b - A @ Factorizer("descent", 1e-1)(A, "test").solve(b)
+    except NotConverged as failure:
+        says = str(failure)
+    else:
+        says = "" if abs(left).max() <= 1e-1 * abs(b).max() else "not solved, and silent"
+    assert says == "" or says.startswith("test: minimal residuals: |b - A x| = ")
+
+
+def test_steepest_descent_that_grows_is_not_followed_into_infinity() -> None:
+    """Each |r| is 1.86 times the one before, and every energy positive, though A has a negative eigenvalue."""
+    A = np.diag([1.0, -0.3])
+    x = Factorizer("descent", 1e-2)(A, "test").solve(np.ones(2))
+    assert abs(np.ones(2) - A @ x).max() <= 1e-2
+
+
+@pytest.mark.parametrize("stop", ["penalty", "softplus", "quadratic", "multiplier"])
+def test_a_bar_behind_a_stop_is_solved_by_iterations(stop: str) -> None:
+    bar = Bar(stop=stop)
+    p = bar.parameters.start
+    for route in (adjoint, tangent, complex_step):
+        result = route.prepare(Model(bar, Solver(linear_solver="krylov")), p)(p)
+        assert relative_error(result.gradient, bar.reference(p).gradient) < 1e-10
 
 
 @pytest.mark.parametrize("linear_solver", ["krylov", "descent"])

@@ -205,7 +205,7 @@ def test_routes_that_cannot_run_are_skipped_with_their_reason(cli) -> None:
 def test_no_event_is_one_line(cli) -> None:
     for problem, low, says in (
         ("bar[stop=penalty]", "2", "stays open"),
-        ("bar[stop=multiplier,gap=-0.1]", "1", "closed"),
+        ("bar[stop=multiplier,gap=-0.1]", "1", "stays closed"),
     ):
         ran = run(cli, problem, "--range", low, "4", "--no-store")
         assert (ran.code, ran.err, ran.out.count("\n")) == (0, "", 1)
@@ -240,7 +240,6 @@ def test_solves_that_fail_are_rows_with_a_reason(cli, points: str) -> None:
         (["bar[stop=penalty]", "--range", "1", "nan"], "--range 1 nan - give two factors"),
         (["bar[stop=penalty]", "--points", "1"], "--points 1 - give at least 2"),
         (["bar[stop=penalty]", "--budget", "0"], "--budget 0 - give seconds > 0"),
-        (["bar[stop=softplus]", "--max-steps", "1"], "kink: bar: not converged in 1 steps"),
         (["bar[stop=softplus]", "--route", "unrolled-ad[inner=cg,iterations=0]"], "iterations"),
     ],
 )
@@ -256,8 +255,56 @@ def test_the_trade_is_shown_with_its_rates(cli) -> None:
     assert ran.out.startswith("bar[stop=quadratic]: no event: the law of the stop is rounded over a width")
     assert "|J - J_exact| ~ width^1.00, paid by d2J/ds2 ~ width^-1.00" in ran.out
     assert "what no width removes" in ran.out
+    assert "p |u_N - gap| [m]   c |d2J/ds2|" in ran.out
+    assert "p |u_N" not in run(cli, "bar[stop=quadratic]", "--no-plot").out
     assert "widen --range" in run(cli, "bar[stop=quadratic]", "--range", "0.5", "1").out
-    assert {row["kind"] for row in run(cli, "bar[stop=quadratic]", "--json").rows} == {"trade"}
+
+
+@by_rounding
+def test_rounded_stops_are_swept_by_every_route(cli, law: str) -> None:
+    """Exact ones are the closed form's derivative at every s, and what differences on either side tend to."""
+    arguments = ("kink", "--problem", f"bar[stop={law}]", "--route", "tangent", "--route", "fd-central")
+    ran = cli(*arguments, "--route", "unrolled-ad[inner=jacobi]", "--points", "7", "--json")
+    assert (ran.code, ran.err) == (0, "")
+    event, *rows = ran.rows
+    assert (event["kind"], event["status"], event["s"]) == ("event", "none", None)
+    skipped, *points = [row for row in rows if row["kind"] == "point"]
+    assert skipped["status"] == "skipped"
+    assert skipped["reason"].startswith("unrolled-ad[inner=jacobi]")
+    assert [row["route"] for row in points] == ["tangent", "fd-central"] * 7
+    for row in points:
+        assert row["active_set"] is None
+        assert row["gradient_error"] < (1e-8 if row["route"] == "fd-central" else 1e-12)
+        for side in ("forward", "backward"):
+            assert row[f"quotient_{side}"] == pytest.approx(row["slope"], abs=1e-6)
+    tips = [row["tip"] for row in points]
+    assert tips == sorted(tips, reverse=True)
+    assert {row["route"] for row in rows if row["kind"] == "trade"} == {"tangent"}
+    out = cli(*arguments, "--route", "unrolled-ad[inner=jacobi]", "--points", "7", "--no-plot").out
+    assert "dJ/ds at s = 0.25 dJ/ds at s = 4 worst in the sweep" in out
+    assert "skipped: unrolled-ad[inner=jacobi]: " in out
+
+
+def test_a_rounded_stop_that_no_route_runs_on_is_swept_without_its_trade(cli) -> None:
+    ran = run(cli, "bar[stop=softplus]", "--points", "2", route="unrolled-ad[inner=jacobi]")
+    assert (ran.code, ran.err.count("\n")) == (0, 1)
+    assert "what the width costs is left out" in ran.err
+
+
+@pytest.mark.parametrize("law", ["penalty", "softplus"])
+def test_a_bar_that_cannot_be_solved_is_exit_code_1(cli, law: str) -> None:
+    ran = run(cli, f"bar[stop={law},k_c=1e20]", "--max-steps", "1", "--range", "0.25", "1", "--points", "3")
+    assert (ran.code, ran.err) == (1, "")
+    assert ran.out.startswith(f"bar[stop={law},k_c=1e20]: no s from 0.25 to 1")
+    assert "not converged in 1 steps" in ran.out
+
+
+def test_exact_contact_that_cannot_be_solved_leaves_the_sweep(cli) -> None:
+    """One step finds the open bar, and no other: at s = 1 it would be closed."""
+    ran = run(cli, "bar[stop=quadratic]", "--max-steps", "1", "--points", "3", "--range", "2", "4", "--json")
+    assert (ran.code, ran.err.count("\n")) == (1, 1)
+    assert ran.err.startswith("routes: kink: what the stop's law costs is not known: bar: not converged in 1 steps")
+    assert [(row["kind"], row["status"]) for row in ran.rows] == [("event", "none")] + 3 * [("point", "ok")]
 
 
 def test_a_jump_is_seen_beside_its_wall() -> None:

@@ -10,11 +10,12 @@ import pytest
 
 from bench import case
 from bench.store import Store
-from bench.studies.tolerance import Sweep, Tolerance, decades, default_solver, tolerance
+from bench.studies.tolerance import Experiment, Sweep, Tolerance, decades, default_solver, tolerance
 from bench.study_rows import TOLERANCE
 from bench.views.tolerance import remarks
 from problems.bar import Bar
 from problems.block import Block
+from routes.iterative import AT_MOST
 
 ROUGH = "bar[n=24,sensors=24,noise=0.01]"  # at its true moduli conjugate gradients take many steps, not n
 
@@ -81,12 +82,12 @@ def test_nonlinear_problems_are_solved_as_ever() -> None:
     assert column(done, "gradient_error")[0] > 1e-3 > 1e-9 > column(done, "gradient_error")[1]
 
 
-def test_what_cannot_run_or_fails_is_a_row_with_its_reason() -> None:
-    done = study("block[n=2]", "unrolled-ad[inner=jacobi]", "adjoint", sweep=Sweep((1e-12,)), linear_solver="descent")
-    skipped, failed = done.rows
+def test_what_cannot_run_or_fails_is_a_row_with_its_reason(monkeypatch) -> None:
+    done = study("block[n=2]", "unrolled-ad[inner=jacobi]", "adjoint", sweep=Sweep((1e-2,)), linear_solver="descent")
+    skipped, loose = done.rows
     assert (skipped["status"], skipped["rtol"]) == ("skipped", None)
     assert "iterates on linear problems" in skipped["reason"]
-    assert failed["status"] in ("ok", "failed")
+    assert (loose["status"], loose["reason"]) == ("ok", None)
     dear = study("bar", "fd-central", sweep=Sweep((1e-3,)), budget=1e-9)
     assert dear.rows[0]["status"] == "skipped"
     assert "--budget inf" in dear.rows[0]["reason"]
@@ -94,6 +95,44 @@ def test_what_cannot_run_or_fails_is_a_row_with_its_reason() -> None:
     assert [row["status"] for row in singular.rows] == ["ok", "ok", "failed", "failed"]
     (line,) = remarks(singular.rows)
     assert line.plain.startswith("failed at 0.01, 0.001: fd-central")
+    monkeypatch.setitem(AT_MOST, "descent", 200)
+    unmet = study("bar", "adjoint", sweep=Sweep((1e-1, 1e-12)), linear_solver="descent").rows
+    assert [row["status"] for row in unmet] == ["ok", "failed"]
+    assert unmet[1]["reason"].startswith("bar: steepest descent: |b - A x| = ")
+
+
+@pytest.mark.parametrize(("problem", "advised"), [("bar[stop=penalty]", True), ("bar[stop=multiplier]", False)])
+def test_descent_is_advised_where_it_ends(cli, problem: str, advised: bool) -> None:
+    out = cli("tolerance", "--problem", problem, "--route", "adjoint", "--tightest", "1e-2", "--no-plot").out
+    assert "note: forward solves are exact at the loosest tolerance" in out
+    assert ("--linear-solver descent" in out) == advised
+
+
+@pytest.mark.parametrize("verb", ["tolerance", "unrolling"])
+def test_a_problem_that_cannot_be_solved_is_one_line(cli, verb: str) -> None:
+    hopeless = (verb, "--problem", "bar[stop=penalty,k_c=1e20]")
+    ran = cli(*hopeless)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (1, "", 1)
+    assert ran.err.startswith("routes: bar: not converged in 50 steps")
+    assert "NotConverged" in cli(*hopeless, "--debug").err
+
+
+def test_an_interrupt_leaves_what_was_measured(cli, monkeypatch) -> None:
+    measure, left = Experiment._point, iter(range(4))
+
+    def interrupted(*arguments):
+        if next(left) == 3:
+            raise KeyboardInterrupt
+        return measure(*arguments)
+
+    monkeypatch.setattr(Experiment, "_point", interrupted)
+    arguments = ("tolerance", "--problem", "bar", "--route", "adjoint", "--route", "tangent", "--tightest", "1e-2")
+    ran = cli(*arguments)
+    assert (ran.code, ran.err.count("\n")) == (130, 1)
+    assert ran.err.startswith("routes: interrupted - what is finished is printed, and kept")
+    table = ran.out[ran.out.index("tolerance residual") :].splitlines()
+    assert [len(line.split()) for line in table[1:3]] == [6, 5]
+    assert len(Store(Path("results/routes.sqlite")).table("tolerance")[1]) == 3
 
 
 def test_the_command_prints_rows_and_keeps_them(cli) -> None:

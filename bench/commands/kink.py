@@ -11,12 +11,11 @@ import click
 from bench.commands.shared import SELECTOR, at_option, checked, complain, debug_option, solver_options, store_options
 from bench.commands.studying import keep, no_plot_option, now, one_problem, writable
 from bench.commands.verdict import built
-from problems.errors import InputError, NotConverged, SingularMatrix
+from problems.errors import InputError, RoutesError
 
 if TYPE_CHECKING:
     from bench.case import RouteSpec
     from bench.studies.event import Kink
-    from bench.studies.ray import Ray
     from bench.studies.rounding import Trade
     from routes.newton import Solver
 
@@ -51,18 +50,19 @@ def kink(
     """Sweep a common factor s on all moduli over the event where the active set changes; look at both sides of it.
 
     Finds s by bisection, shows dJ/ds by every route from the left and from the right, and what finite differences make
-    of it. A stop whose law is rounded has no event: shows what its width costs and buys instead.
+    of it. A stop whose law is rounded has no event: shows the sweep, and what its width costs and buys.
 
     \b
     routes kink --problem 'bar[stop=multiplier]'
     routes kink --problem 'bar[stop=softplus]' --route adjoint
 
-    Exit code: 0 measured, 1 forward solves failed, 2 wrong usage.
+    Exit code: 0 measured, 1 forward solves failed, 2 wrong usage, 130 interrupted, nothing kept.
     """
     import numpy as np
 
     from bench import case
     from bench.rows import as_json as json_line
+    from bench.studies import kink as study
     from bench.studies.kink_rows import rows
     from bench.studies.ray import Ray
 
@@ -78,11 +78,13 @@ def kink(
     made, p = built(one_problem(problem), at)
     writable(kept)
     ray = Ray(made, p, solver)
-    try:
-        with np.errstate(all="ignore"):
-            swept, traded = _measured(ray, specs, bool(routes), np.geomspace(low, high, points).tolist(), budget)
-    except (NotConverged, SingularMatrix) as failure:
-        raise InputError(f"kink: {failure}") from failure
+    failure = None
+    with np.errstate(all="ignore"):
+        swept, traded = study.kink(ray, specs, np.geomspace(low, high, points).tolist(), budget), None
+        try:
+            traded = _traded(swept, specs if routes else case.routes(["adjoint"]), budget)
+        except RoutesError as unsolved:
+            failure = unsolved
     found = rows(swept, traded, {"problem": problem, "at": at})
     if as_json:
         for row in found:
@@ -90,41 +92,37 @@ def kink(
     else:
         _show(swept, traded, problem, not no_plot)
     keep(kept, {"kink": found}, started, quiet=as_json)
-    if swept is not None and swept.failed:
+    if swept.rounded and not swept.failed and traded is None and failure is None:
+        complain("kink: what the width costs is left out: no route runs for it - name another with --route")
+    if failure is not None:
+        complain(f"kink: what the stop's law costs is not known: {failure}")
+    if swept.failed or failure is not None:
         sys.exit(1)
 
 
-def _measured(
-    ray: Ray, specs: list[RouteSpec], named: bool, s: list[float], budget: float
-) -> tuple[Kink | None, Trade | None]:
-    """The sweep where the law has a kink, the trade where a stop yields; the latter by one route."""
-    from bench import case
-    from bench.studies import kink
-    from bench.studies.rounding import GRADIENTS, trade, width_of, yielding
+def _traded(swept: Kink, specs: list[RouteSpec], budget: float) -> Trade | None:
+    """What a stop that yields costs, by the first of the routes that runs, an exact one before others.
 
-    stop = yielding(ray.problem)
-    swept = kink.kink(ray, specs, s, budget) if stop is None or width_of(stop) is None else None
-    if stop is None or (swept is not None and swept.event is None):
-        return swept, None
-    reasons = []
-    for spec in specs if named else case.routes(["adjoint"]):
-        reason = kink.why_not(ray, spec, 1.0, GRADIENTS, budget)
-        if reason is None:
-            break
-        reasons.append(reason)
-    else:
-        if swept is not None:
-            return swept, None
-        raise InputError(f"kink: {'; '.join(reasons)} - choose another route")
-    return swept, trade(ray, stop, spec, s[0], s[-1])
+    None where there is no such stop or route, or nothing to compare. Raises what the solve of exact contact raises.
+    """
+    from bench.studies.kink import why_not
+    from bench.studies.rounding import GRADIENTS, trade, yielding
+
+    ray, stop = swept.ray, yielding(swept.ray.problem)
+    if stop is None or swept.failed or (swept.event is None and not swept.rounded):
+        return None
+    for spec in sorted(specs, key=lambda spec: spec.route.accuracy > 0.0):
+        if why_not(ray, spec, 1.0, GRADIENTS, budget) is None:
+            return trade(ray, stop, spec, swept.visits[0].s, swept.visits[-1].s)
+    return None
 
 
-def _show(swept: Kink | None, traded: Trade | None, problem: str, plots: bool) -> None:
-    from bench.views.kink import show_kink, show_trade
+def _show(swept: Kink, traded: Trade | None, problem: str, plots: bool) -> None:
+    from bench.views.kink import show_kink
+    from bench.views.rounding import show_trade
     from bench.views.tables import console
 
     out = console()
-    if swept is not None:
-        show_kink(out, swept, problem, plots)
+    show_kink(out, swept, problem, plots)
     if traded is not None:
-        show_trade(out, traded, problem)
+        show_trade(out, traded, plots)

@@ -77,6 +77,9 @@ def tolerance(
 
     Finite differences differentiate the solver's noise, the adjoint relies on an identity that a loose solve violates,
     unrolled AD differentiates another iterate.
+
+    Exit code: 0 measured (a tolerance that is not met is a row that says so), 1 the problem cannot be solved at all,
+    2 wrong usage, 130 interrupted.
     """
     from bench import case
     from bench.studies import tolerance as study
@@ -93,8 +96,10 @@ def tolerance(
     if as_json:
         echo_json(tables)
     else:
-        view.show(done.rows, plotted=not no_plot)
+        view.show(done.rows, plotted=not no_plot, definite=done.definite)
     keep(kept, tables, started, quiet=as_json)
+    if done.interrupted:
+        raise KeyboardInterrupt
 
 
 def swept(tolerances: tuple[float, ...], sweep: Swept | None, rtol: float | None, adjoint_rtol: float | None) -> Sweep:

@@ -51,6 +51,8 @@ def unrolling(
     """What unrolled AD takes to be right: errors of J and its gradient, and bytes of tape, against k iterations.
 
     k doubles until the gradient meets that of implicit-ad; the tape is fitted by a line. Errors of 2e-13 are rounding.
+
+    Exit code: 0 measured, 1 the problem cannot be solved, 2 wrong usage, 130 interrupted, nothing kept.
     """
     from bench.studies import unrolling as study
     from bench.views import unrolling as view

@@ -11,6 +11,8 @@ from bench.studies.ray import Ray
 
 Side = Literal["left", "right"]
 NOTHING = 1e-13  # of the terms of a slope: its rounding
+EXACT = 1e-10  # relative error of a gradient on its branch
+NEAR = 1.05  # a factor on s that stays near the event
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,8 @@ def in_words(slope: float, size: float) -> str:
 class Kink:
     """Everything measured along a ray.
 
-    events  how many the sweep has seen; `event` is the first of them, None where `reason` says why it cannot be had
+    events   how many the sweep has seen; `event` is the first of them, None where `reason` says why it cannot be had
+    rounded  there can be none, the law of the stop being smooth
     """
 
     ray: Ray
@@ -114,6 +117,7 @@ class Kink:
     event: Event | None = None
     stencils: tuple[Stencil, ...] = ()
     reason: str | None = None
+    rounded: bool = False
 
     @property
     def routes(self) -> list[RouteSpec]:
@@ -140,6 +144,11 @@ class Kink:
         if self.reason is not None:
             return f"the active set changes, yet where cannot be told: {self.reason}"
         moves = f", its tip at {max(tips):.4g} to {min(tips):.4g} m" if tips else ""
+        if self.rounded:
+            smooth = (
+                f"the law of the stop is rounded over a width, and dJ/ds does not jump for s from {low:g} to {high:g}"
+            )
+            return f"no event: {smooth}{moves}"
         if self.event is None:
             stays = f"no event: stays {solved[0].active_set} for s from {low:g} to {high:g}{moves}"
             return f"{stays} - widen --range, start elsewhere with --at, or change the problem (the gap of a bar, say)"

@@ -15,8 +15,9 @@ import numpy as np
 from bench.accuracy import Judge, Judges
 from bench.bill import prices, unaffordable
 from bench.case import RouteSpec
-from bench.studies.event import Event, Kink, Side, Slope, Stencil, Visit
+from bench.studies.event import NEAR, Event, Kink, Side, Slope, Stencil, Visit
 from bench.studies.ray import Gradients, Ray, bisect
+from bench.studies.rounding import is_rounded
 from problems.errors import InputError, RoutesError
 from problems.problem import Offers, Problem
 from routes.model import Model
@@ -24,8 +25,7 @@ from routes.route import Route
 
 ONE_SIDED = float(np.finfo(np.float64).eps) ** 0.5  # step of one-sided quotients, relative to s
 STENCILS = tuple(10.0**-k for k in range(1, 8))  # steps over the event, relative to s: it is known to 1e-12
-NEAR, NEARBY = 1.05, 24  # from s / NEAR to s NEAR so many more visits, to see the event from near
-EXACT = 1e-10  # relative error of a gradient on its branch
+NEARBY = 24  # visits from s / NEAR to s NEAR, to see the event from near
 CHOICES = (
     "choose a problem that has, bar[stop=penalty] or bar[stop=multiplier] say, or one rounded, bar[stop=softplus] or"
     " bar[stop=quadratic]"
@@ -35,23 +35,25 @@ CHOICES = (
 def kink(ray: Ray, routes: Sequence[RouteSpec], s: Sequence[float], budget: float = math.inf) -> Kink:
     """Sweep J and its gradient by every route over the factors s, ascending; find the first event, look at both sides.
 
-    Routes that cannot run, or whose gradients would take more than `budget` seconds, are skipped. Raises InputError
-    where the problem has no active set.
+    Where the law of a stop is rounded there is none: the sweep is all. Routes that cannot run, or whose gradients would
+    take more than `budget` seconds, are skipped. Raises InputError where the problem has no active set.
     """
     problem = ray.problem
     if Offers.SOLVE not in problem.offers or type(problem).active_set is Problem.active_set:
         raise smooth(problem)
     visits = tuple(visit(ray, float(one)) for one in s)
     solved = [v for v in visits if v.reason is None]
-    if any(v.active_set is None for v in solved):
+    rounded = is_rounded(problem)
+    if any(v.active_set is None for v in solved) and not rounded:
         raise smooth(problem)
-    reasons = [(r, why_not(ray, r, solved[0].s if solved else None, len(s) + NEARBY + 2, budget)) for r in routes]
+    gradients = len(s) + (0 if rounded else NEARBY + 2)
+    reasons = [(r, why_not(ray, r, solved[0].s if solved else None, gradients, budget)) for r in routes]
     runnable = [r for r, reason in reasons if reason is None]
     skipped = tuple((r, reason) for r, reason in reasons if reason is not None)
     pairs = [(a.s, b.s) for a, b in pairwise(solved) if a.active_set != b.active_set]
     places: list[tuple[float, Side | None]] = [(v.s, None) for v in solved]
     if not pairs:
-        return Kink(ray, visits, tuple(slopes(ray, runnable, places)), skipped, 0)
+        return Kink(ray, visits, tuple(slopes(ray, runnable, places)), skipped, 0, rounded=rounded)
     try:
         left, right = (visit(ray, one) for one in bisect(ray, *pairs[0]))
         why = left.reason or right.reason

@@ -6,17 +6,17 @@ from collections.abc import Hashable
 
 from bench.case import RouteSpec
 from bench.rows import Row
+from bench.selector import written
 from bench.studies.event import Kink
 from bench.studies.rounding import Trade, width_of
 from bench.study_rows import KINK
-from bench.views.format import selector
 
 EMPTY: Row = dict.fromkeys((c.name for c in KINK), None)
 
 
-def rows(kink: Kink | None, trade: Trade | None, what: Row) -> list[Row]:
+def rows(kink: Kink, trade: Trade | None, what: Row) -> list[Row]:
     """Rows of what was measured; `what` holds problem and at."""
-    measured = ([] if kink is None else of_kink(kink)) + ([] if trade is None else of_trade(trade))
+    measured = of_kink(kink) + ([] if trade is None else of_trade(trade))
     return [EMPTY | what | row for row in measured]
 
 
@@ -117,7 +117,7 @@ def _status(reason: str | None, otherwise: str = "failed") -> Row:
 
 def named(spec: RouteSpec) -> str:
     """The route's selector."""
-    return selector(spec.route.name, spec.options, spec.route.defaults)
+    return written(spec.route.name, spec.options, spec.route.defaults)
 
 
 def word(active_set: Hashable | None) -> str | None:

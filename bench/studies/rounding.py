@@ -68,6 +68,12 @@ def width_of(stop: Compliant) -> float | None:
     return stop.law.width if isinstance(stop.law, Softplus | Quadratic) else None
 
 
+def is_rounded(problem: Problem) -> bool:
+    """Whether a stop has a kink that its law rounds over a width."""
+    stop = yielding(problem)
+    return stop is not None and width_of(stop) is not None
+
+
 def variants(stop: Compliant) -> list[Compliant]:
     """Over decades of the width, or of the stiffness of a stop that has none; the problem's own among them."""
     law = stop.law

@@ -24,6 +24,7 @@ from routes.model import Model
 from routes.newton import Solver, norm
 from routes.route import Options, Result, Route
 
+NOT_SHARED = ("definite", "interrupted", "points")  # by rows
 FEW = 32  # unknowns up to which conjugate gradients are exact before they are accurate
 
 
@@ -76,7 +77,11 @@ class Point:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The study: its points and what they share."""
+    """The study: its points and what they share.
+
+    definite     R_u is positive definite: descent ends on it
+    interrupted  by Ctrl-C, after these points
+    """
 
     problem: str
     problem_options: Options
@@ -85,12 +90,14 @@ class Tolerance:
     sweep: str
     n_state: int
     n_param: int
+    definite: bool = field(repr=False)
+    interrupted: bool = field(repr=False)
     points: tuple[Point, ...] = field(repr=False)
 
     @property
     def rows(self) -> list[Row]:
         """Tidy: one a point, with the columns of the table `tolerance`."""
-        shared = {name: value for name, value in vars(self).items() if name != "points"}
+        shared = {name: value for name, value in vars(self).items() if name not in NOT_SHARED}
         return [shared | asdict(point) for point in self.points]
 
 
@@ -104,15 +111,34 @@ def tolerance(
 ) -> Tolerance:
     """Every route at every tolerance, judged by what is found directly at a tight one.
 
-    A route predicted to take more than `budget` seconds in all is skipped. Raises InputError, DomainError.
+    A route predicted to take more than `budget` seconds in all is skipped. Ctrl-C ends the study, not what it has
+    measured. Raises InputError, DomainError, and what the solve at that tight tolerance raises.
     """
     bench = Bench(problem, at, budget)
     linear_solver = linear_solver or default_solver(bench.problem)
     experiment = Experiment(bench, sweep, linear_solver, budget)
+    points: list[Point] = []
+    interrupted = False
     with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
-        points = tuple(point for route in routes for point in experiment.points(route))
-    sizes = (bench.problem.n_state, len(bench.p))
-    return Tolerance(problem.name, problem.options, at, linear_solver, sweep.name, *sizes, points)
+        try:
+            for point in (point for route in routes for point in experiment.points(route)):
+                points.append(point)
+        except KeyboardInterrupt:
+            if not points:
+                raise
+            interrupted = True
+    return Tolerance(
+        problem.name,
+        problem.options,
+        at,
+        linear_solver,
+        sweep.name,
+        bench.problem.n_state,
+        len(bench.p),
+        bench.problem.structure == "spd",
+        interrupted,
+        tuple(points),
+    )
 
 
 def default_solver(problem: Problem) -> LinearSolver:

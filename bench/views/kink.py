@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import log
-
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from bench.studies.event import Kink, Slope, in_words
-from bench.studies.kink import EXACT, NEAR
+from bench.studies.event import EXACT, NEAR, Kink, Slope, in_words
 from bench.studies.kink_rows import named
-from bench.studies.rounding import Trade, Traded, width_of
 from bench.views.format import number
 from bench.views.palette import route_style
 from bench.views.panel import panel
@@ -38,11 +33,15 @@ def show_kink(out: Console, kink: Kink, problem: str, plots: bool = True) -> Non
         if plots:
             out.print()
             out.print(curves(kink, min(out.width, WIDEST)))
+    elif kink.rounded and kink.routes:
+        out.print()
+        show(out, swept(kink))
     for line in remarks(kink):
         out.print(Text(line, style="dim"), soft_wrap=wrap)
 
 
-def _table(*names: str) -> Table:
+def aligned(*names: str) -> Table:
+    """Columns of numbers."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     for name in names:
         table.add_column(name, justify="right", no_wrap=True)
@@ -64,6 +63,27 @@ def sides(kink: Kink) -> Table:
     event = kink.event
     assert event is not None
     table.add_row("differences of J", number(event.left.backward, 6), number(event.right.forward, 6), style="dim")
+    return table
+
+
+def swept(kink: Kink) -> Table:
+    """One row a route: dJ/ds at both ends of a sweep without event, and where its gradient is most wrong."""
+    solved = [v for v in kink.visits if v.reason is None]
+    ends = (solved[0], solved[-1])
+    names = [f"dJ/ds at s = {v.s:g}" for v in ends]
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("route", overflow="fold", min_width=14)
+    for name in (*names, "worst in the sweep", "at s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for spec in kink.routes:
+        of = {s.s: s for s in kink.slopes if s.route == spec}
+        judged = [s for s in of.values() if s.error is not None]
+        worst = max(judged, key=lambda s: s.error or 0.0, default=None)
+        cells = [_slope(of[v.s]) for v in ends] + (
+            ["unknown"] if worst is None else [number(worst.error, 2), f"{worst.s:.4g}"]
+        )
+        table.add_row(Text(named(spec)), *cells, style=route_style(spec.route.name))
+    table.add_row("differences of J", *(number(q, 6) for q in (ends[0].forward, ends[1].backward)), style="dim")
     return table
 
 
@@ -99,7 +119,7 @@ def judged(kink: Kink) -> list[str]:
 
 def stencils(kink: Kink) -> Table:
     """Central quotients over the event at decreasing steps."""
-    table = _table("h / s", "central quotient over it", "off the left", "off the right")
+    table = aligned("h / s", "central quotient over it", "off the left", "off the right")
     for one in kink.stencils:
         cells = (f"{one.step:.0e}", number(one.quotient, 6), number(one.off_left, 3), number(one.off_right, 3))
         table.add_row(*cells) if one.reason is None else table.add_row(cells[0], "failed")
@@ -154,60 +174,3 @@ def remarks(kink: Kink) -> list[str]:
             where = f"{len(missing)} s, first {missing[0].s:g}"
             lines.append(f"failed: {named(spec)} at {where}: {missing[0].reason}")
     return lines
-
-
-def show_trade(out: Console, trade: Trade, problem: str) -> None:
-    """At s = 1, where the stop is as it was asked for, then where exact contact has its kink."""
-    wrap, route = not out.is_terminal, named(trade.route)
-    rounded = width_of(trade.rows[0].stop) is not None
-    if rounded:
-        kinked = "" if trade.event is None else f"; exact contact has a kink at s = {trade.event:.10g}"
-        said = f": no event: the law of the stop is rounded over a width, and dJ/ds does not jump{kinked}"
-        out.print(Text.assemble((problem, "bold"), said), soft_wrap=wrap)
-    for s in trade.at:
-        rows = [row for row in trade.rows if row.s == s]
-        out.print()
-        title = f"s = {s:.10g}{', the kink of exact contact' if s == trade.event else ''}; dJ/ds by {route}"
-        out.print(Text(title, style="bold"), soft_wrap=wrap)
-        show(out, traded(rows, rounded))
-        for line in rates(rows) if rounded and s == trade.event else yields(rows) if rounded else []:
-            out.print(Text(line), soft_wrap=wrap)
-    out.print(Text("exact: a stop that does not yield, by a multiplier; the data are the same", style="dim"))
-    if rounded and trade.event is None:
-        out.print("no kink of exact contact in this range - widen --range to see what the width rounds", soft_wrap=wrap)
-
-
-def yields(rows: Sequence[Traded]) -> list[str]:
-    """What is left of the error where the width is least."""
-    last = rows[-1]
-    if last.off_objective is None:
-        return []
-    return [
-        f"what no width removes, {last.off_objective:.2g} in J, is the stop's yielding: k_c = {last.stop.law.k_c:g}"
-    ]
-
-
-def rates(rows: Sequence[Traded]) -> list[str]:
-    """Powers of the width, by its least two."""
-    (w, J, bend), (w_next, J_next, bend_next) = (
-        (width_of(row.stop), row.off_objective, row.curvature) for row in rows[-2:]
-    )
-    if not (w and w_next and J and J_next and bend and bend_next):
-        return []
-    error, curvature = (log(after / before) / log(w_next / w) for before, after in ((J, J_next), (bend, bend_next)))
-    return [f"|J - J_exact| ~ width^{error:.2f}, paid by d2J/ds2 ~ width^{curvature:.2f}"]
-
-
-def traded(rows: Sequence[Traded], rounded: bool) -> Table:
-    """One row a variant of the stop."""
-    names = ("u_N - gap", "J", "|J - J_exact|", "|dJ/ds - exact|", "d2J/ds2", "Newton steps")
-    table = _table("width" if rounded else "k_c", *(n for n in names if rounded or n != "d2J/ds2"))
-    for one in rows:
-        varied = f"{width_of(one.stop) if rounded else one.stop.law.k_c:g}"
-        if one.reason is not None:
-            table.add_row(varied, "failed")
-            continue
-        values = (one.penetration, one.objective, one.off_objective, one.off_slope)
-        cells = [number(v, d) for v, d in zip(values, (3, 4, 2, 2), strict=True)]
-        table.add_row(varied, *cells, *([number(one.curvature, 3)] if rounded else []), str(one.iterations))
-    return table

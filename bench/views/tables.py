@@ -16,7 +16,8 @@ from bench.bill import LEGEND, summary
 from bench.options import options_of
 from bench.rows import Row
 from bench.runner import View
-from bench.views.format import bytes_, number, ratio, seconds, selector
+from bench.selector import written
+from bench.views.format import bytes_, number, ratio, seconds
 from bench.views.palette import route_style
 from problems.errors import InputError
 from routes.tally import Work
@@ -108,8 +109,8 @@ def named(kind: registry.Kind, row: Row) -> str:
     try:
         factory = registry.factory_of(registry.find(kind, name).load())
     except InputError:  # a stored row of a plug-in that is gone
-        return selector(name, options, {})
-    return selector(name, options, {n: o.default for n, o in options_of(factory).items()})
+        return written(name, options, {})
+    return written(name, options, {n: o.default for n, o in options_of(factory).items()})
 
 
 def titled(row: Row) -> str:

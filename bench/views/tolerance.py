@@ -18,15 +18,18 @@ SWEPT = {
     "forward": "tolerance of forward solves, linearized and adjoint ones at",
     "adjoint": "tolerance of linearized and adjoint solves, forward ones at",
 }
+NOT_YET: Row = {"status": "", "residual": None, "adjoint_residual": None, "objective_error": None}  # interrupted
 EXACT = 1e-6  # of the tolerance asked for
-JUMPED = "forward solves are exact at the loosest tolerance: --linear-solver descent takes it step by step"
+JUMPED = "forward solves are exact at the loosest tolerance"
+SLOWLY = ": --linear-solver descent takes it step by step"
 LEGEND = (
     "residual: |R| / |R_0| achieved, adjoint: |R_u^T lam + J_u| / |J_u|, J: |J - J_ref| / |J_ref|, each of the first"
     " route that tells it\nthen |g - g_ref| / |g_ref| by route; floor: the least of a column"
 )
 
 
-def show(rows: Sequence[Row], plotted: bool = True) -> None:
+def show(rows: Sequence[Row], plotted: bool = True, definite: bool = False) -> None:
+    """`definite` is R_u of the problem: what descent is for."""
     out = tables.console()
     measured = [row for row in rows if row["rtol"] is not None]
     if plotted and measured:
@@ -37,7 +40,7 @@ def show(rows: Sequence[Row], plotted: bool = True) -> None:
         out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)
-    for line in remarks(rows):
+    for line in remarks(rows, definite):
         out.print(line, soft_wrap=not out.is_terminal)
 
 
@@ -90,7 +93,7 @@ def table(rows: Sequence[Row]) -> Table:
     for name, of in routes.items():
         out.add_column(Text(name), justify="right", overflow="fold", min_width=7, style=route_style(of[0]["route"]))
     for t in dict.fromkeys(swept(row) for row in rows):
-        at = {name: next(row for row in of if swept(row) == t) for name, of in routes.items()}
+        at = {name: next((row for row in of if swept(row) == t), NOT_YET) for name, of in routes.items()}
         achieved = (_first(at.values(), key) for key in ("residual", "adjoint_residual", "objective_error"))
         out.add_row(f"{t:.2g}", *(number(value, 2) for value in achieved), *map(_cell, at.values()))
     floors = [
@@ -109,7 +112,7 @@ def _cell(row: Row) -> str:
     return (number(row["gradient_error"], 2) or "unknown") if row["status"] == "ok" else row["status"]
 
 
-def remarks(rows: Sequence[Row]) -> list[Text]:
+def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
     """Reasons of what was skipped, and of what failed at which tolerances."""
     at: dict[tuple[str, str, str], list[float]] = {}
     for row in rows:
@@ -124,7 +127,8 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
         )
         for (status, reason, _), where in at.items()
     ]
-    return lines + ([Text(f"note: {JUMPED}", style="italic")] if _jumped(rows) else [])
+    slowly = SLOWLY if definite and rows[0]["linear_solver"] != "descent" else ""
+    return lines + ([Text(f"note: {JUMPED}{slowly}", style="italic")] if _jumped(rows) else [])
 
 
 def _jumped(rows: Sequence[Row]) -> bool:
