@@ -238,12 +238,12 @@ def test_what_a_program_prints_stays_off_stdout(tmp_path: Path) -> None:
 
 
 def test_a_file_is_run_once(cli, mine: Path) -> None:
-    mine.write_text(
-        mine.read_text()
-        + "from pathlib import Path; Path('runs').write_text(Path('runs').read_text() + 'x' if Path('runs').exists() else 'x')\n"
+    counting = (
+        "from pathlib import Path\nruns = Path('runs')\nruns.write_text(f'{runs.exists() and runs.read_text()}x')\n"
     )
+    mine.write_text(mine.read_text() + counting)
     cli("check", "--objective", "mine.py:J", "--gradient", "mine.py:dJ", "--at", "p.csv", "--no-store")
-    assert (mine.parent / "runs").read_text() == "x"
+    assert (mine.parent / "runs").read_text() == "Falsex"
 
 
 SPRING = """

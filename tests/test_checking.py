@@ -141,6 +141,100 @@ def test_float32_is_judged_as_float32() -> None:
     assert check(J, lambda p: 1.001 * dJ(p).astype(np.float32), P).verdict != "agrees"
 
 
+X = np.linspace(0.1, 1.0, 10)
+
+
+def sines(p: Array) -> float:
+    return float(np.sin(p).sum())
+
+
+@pytest.mark.parametrize(
+    "objective",
+    [
+        lambda p: (1e6 + sines(p)) - 1e6,  # cancels
+        lambda p: float(f"{sines(p):.5e}"),  # printed
+        lambda p: round(sines(p), 8),
+        lambda p: float(np.float16(sines(p))),
+        lambda p: sines(p.astype(np.float32).astype(float)),  # p rounded
+        lambda p: 1e16 + sines(p),  # drowned
+    ],
+)
+def test_a_rounded_objective_convicts_no_right_gradient(objective) -> None:
+    assert check(objective, np.cos, X).verdict in ("agrees", "noise-limited")
+    assert check(objective, lambda p: -np.cos(p), X).verdict in ("wrong-gradient", "noise-limited")
+
+
+def test_a_minimum_is_no_plateau() -> None:
+    found = check(lambda p: float(np.sum(1.0 - np.cos(p - X))), lambda p: np.sin(p - X), X)
+    assert found.verdict == "agrees"
+    found = check(lambda p: float(np.cosh(p[0]) - 1.0), np.sinh, [1e-6], scale=1.0)
+    assert found.verdict in ("agrees", "noise-limited")
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e9, 1e12])
+def test_a_large_J_hides_a_sign_but_does_not_acquit_it(offset: float) -> None:
+    found = check(lambda p: offset + 0.1 * sines(p), lambda p: -0.1 * np.cos(p), X)
+    assert found.verdict in ("wrong-gradient", "noise-limited")
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e200])
+def test_gradients_whose_squares_leave_float64(size: float) -> None:
+    assert check(lambda p: size * sines(p), lambda p: size * np.cos(p), X).verdict == "agrees"
+    wrong_one = np.where(np.arange(10) == 3, 1.5, 1.0)
+    assert check(lambda p: size * sines(p), lambda p: size * wrong_one * np.cos(p), X).verdict == "wrong-gradient"
+
+
+def test_float16_has_three_digits() -> None:
+    assert check(sines, lambda p: np.cos(p).astype(np.float16), X).verdict == "agrees"
+    assert check(sines, lambda p: (1.05 * np.cos(p)).astype(np.float16), X).verdict == "wrong-gradient"
+
+
+def test_slowly_converging_quotients_convict_nobody() -> None:
+    found = check(
+        lambda p: float((p**1.1).sum()), lambda p: 1.1 * p**0.1, np.array([0.0, 1.0, 2.0]), bounds=(0.0, np.inf)
+    )
+    assert found.verdict != "wrong-gradient"
+
+
+def test_small_components_are_looked_at_on_their_own() -> None:
+    w, z = np.array([1.0, 1e-4, 1e-8, 1e-9]), np.array([1.0, 1.0, -1.0, 1.0])
+    found = check(lambda p: float(w @ np.sin(p)), lambda p: z * w * np.cos(p), np.ones(4))
+    assert found.verdict == "wrong-gradient"
+    assert [x.index for x in found.located.worst] == [2]
+
+
+def cold(tolerance: float):
+    def objective(p: Array) -> float:
+        u = 0.0
+        while abs(u - np.exp(p[0])) > max(tolerance, 1e-14):
+            u = 0.5 * (u + np.exp(p[0]))
+        return float(u * u)
+
+    return objective
+
+
+def of_cold(p: Array) -> Array:
+    return 2.0 * np.exp(2.0 * p)
+
+
+@pytest.mark.parametrize("tighter", [lambda k: cold(0.002), lambda k: cold(0.002 * k**0.05)])
+def test_a_tighten_that_does_little_convicts_nobody(tighter) -> None:
+    found = check(cold(0.002), of_cold, [0.3], tighten=lambda k: (tighter(k), of_cold))
+    assert found.verdict != "wrong-gradient"
+
+
+def test_a_loose_solver_does_not_acquit_a_wrong_term() -> None:
+    found = check(
+        cold(0.3), lambda p: 1.1 * of_cold(p), [0.3], tighten=lambda k: (cold(0.3 * k), lambda p: 1.1 * of_cold(p))
+    )
+    assert found.verdict == "wrong-gradient"
+
+
+def test_a_small_kink_hides_no_gross_mistake() -> None:
+    found = check(lambda p: float(3e-5 * np.abs(p - 1.0).sum() + p @ p), lambda p: -2.0 * p, np.ones(300))
+    assert found.verdict == "wrong-gradient"
+
+
 # --- scales
 
 

@@ -48,11 +48,11 @@ FAULTS: tuple[tuple[str, Verdict, tuple[str, ...]], ...] = (
     ("factor", WRONG, PROBLEMS),
     ("transpose", WRONG, (PROBLEMS[7], PROBLEMS[8], PROBLEMS[9])),
     ("missing-term", WRONG, (PROBLEMS[0], PROBLEMS[1], PROBLEMS[9])),
-    ("functional", WRONG, (PROBLEMS[0], PROBLEMS[1], PROBLEMS[4], PROBLEMS[8], PROBLEMS[9])),
-    ("scale", WRONG, (PROBLEMS[0], PROBLEMS[2], PROBLEMS[4], PROBLEMS[6], PROBLEMS[8])),
+    ("functional", WRONG, (*PROBLEMS[:6], PROBLEMS[8], PROBLEMS[9])),
+    ("scale", WRONG, (PROBLEMS[0], *PROBLEMS[2:9])),
     ("otd", "inconsistent-discretization", (PROBLEMS[8], PROBLEMS[9])),
     ("loose", LOOSE, (PROBLEMS[5], PROBLEMS[6], PROBLEMS[7])),
-    ("stale", LOOSE, (PROBLEMS[6], PROBLEMS[7])),
+    ("stale", LOOSE, (PROBLEMS[5], PROBLEMS[6], PROBLEMS[7])),
 )
 INVISIBLE = (("transpose", PROBLEMS[0]), ("transpose", PROBLEMS[6]), ("stale", PROBLEMS[0]))  # no fault where these are
 STALE_RTOL = 1e-6  # factors of the Newton step before are the worse, the looser the solve
