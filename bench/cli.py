@@ -72,7 +72,8 @@ class Routes(click.Group):
 
 def leave(code: int) -> NoReturn:
     """Exit at once: what XLA's threads are compiling cannot be waited for, and crashes where it is torn down."""
-    if "jax" in sys.modules:
+    own_process = sys.stdout is sys.__stdout__
+    if own_process and "jax" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

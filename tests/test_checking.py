@@ -206,7 +206,9 @@ def test_small_components_are_looked_at_on_their_own() -> None:
 def cold(tolerance: float):
     def objective(p: Array) -> float:
         u = 0.0
-        while abs(u - np.exp(p[0])) > max(tolerance, 1e-14):
+        for _ in range(60):
+            if abs(u - np.exp(p[0])) <= tolerance:
+                break
             u = 0.5 * (u + np.exp(p[0]))
         return float(u * u)
 
@@ -340,7 +342,9 @@ def loosely(tolerance: float):
 
     def solve(p: Array) -> Array:
         x = np.ones_like(p)
-        while np.abs(x * x - p).max() > max(tolerance, 1e-14):
+        for _ in range(200):
+            if np.abs(x * x - p).max() <= tolerance:
+                return x
             x = x - (x * x - p) / (4.0 * x)
         return x
 
@@ -383,7 +387,11 @@ class Warm:
         self.tolerance, self.x = tolerance, np.ones(2)
 
     def objective(self, p: Array) -> float:
-        while np.abs(self.x**2 - p).max() > max(self.tolerance, 1e-14):
+        if (p <= 0.0).any():
+            return float("nan")
+        for _ in range(200):
+            if np.abs(self.x**2 - p).max() <= self.tolerance:
+                break
             self.x = self.x - (self.x**2 - p) / (4.0 * self.x)
         return float((self.x**3).sum())
 
@@ -404,7 +412,7 @@ def test_a_warm_started_objective_never_convicts_a_right_gradient(tolerance: flo
 def test_an_objective_that_remembers_is_told() -> None:
     warm = Warm(1e-3)
     found = check(warm.objective, warm.gradient, ROOTS)
-    assert any("does it start from the last state?" in remark for remark in found.remarks)
+    assert any("does it start from the last" in remark for remark in found.remarks)
 
 
 def test_a_budget_too_small_to_tighten_convicts_nobody() -> None:

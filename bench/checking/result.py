@@ -27,17 +27,14 @@ class Tightened:
     """The line of the plateau again, the forward solve's tolerance times `factor`.
 
     gradient_moved, quotient_moved  by how much both sides moved from before, relative
+    moved  whether tightening has changed J(p) or the gradient in any digit
     """
 
     factor: float
     reading: Reading
     gradient_moved: float
     quotient_moved: float
-
-    @property
-    def moved(self) -> bool:
-        """Whether tightening has changed anything."""
-        return self.gradient_moved > 0.0 or self.quotient_moved > 0.0
+    moved: bool
 
 
 @dataclass(frozen=True)

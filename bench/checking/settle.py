@@ -51,7 +51,7 @@ def tighten(seen: Examination, reading: Reading) -> tuple[tuple[Tightened, ...],
     And why that ended early, where it did.
     """
     found: list[Tightened] = []
-    for factor in FACTORS:
+    for factor in reversed(FACTORS) if reading.says == "noise" else FACTORS:  # noise takes a sweep of all steps
         again = _again(seen, reading, factor)
         if isinstance(again, str):
             return tuple(found), again
@@ -65,7 +65,8 @@ def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | st
     """In words where the tightened subject cannot be had, or its calls are not left."""
     assert seen.subject.tighten is not None
     plan, line = seen.plan, reading.sweep.line
-    h = plan.steps if plan.everywhere or reading.level is None else plan.near(reading.level.h)
+    near = not plan.everywhere and reading.level is not None and reading.says != "noise"
+    h = plan.near(reading.level.h) if near and reading.level is not None else plan.steps
     needed = 2 * len(h) + 2
     if seen.J.left() < needed:
         return f"the forward solve was not tightened by {factor:g}: {seen.J.left():g} calls left, {needed} needed"
@@ -74,7 +75,7 @@ def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | st
         other = Examination.of(subject, plan, seen.J.sharing(subject.objective), seen.accepted)
     except FOREIGN as failure:
         return f"tighten({factor:g}) gave nothing to look at: {type(failure).__name__}: {failure}"
-    if not plan.everywhere:
+    if near:
         other.readings.append(reading)  # tells the noise of J, which few steps cannot
     tight = other.read(line, h)
     if tight.says == "nothing":
@@ -82,7 +83,8 @@ def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | st
     moved = norm2((other.gradient - seen.gradient) * seen.subject.natural)
     quotients = reading.quotient, tight.quotient
     by = abs(quotients[0] - quotients[1]) if None not in quotients else float("nan")  # type: ignore[operator]
-    return Tightened(factor, tight, _relative(moved, seen.size), _relative(by, reading.scale))
+    changed = other.J_0 != seen.J_0 or not np.array_equal(other.gradient, seen.gradient)
+    return Tightened(factor, tight, _relative(moved, seen.size), _relative(by, reading.scale), changed)
 
 
 def _relative(value: float, scale: float) -> float:
