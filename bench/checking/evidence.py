@@ -10,6 +10,7 @@ from bench.checking.curve import slope
 from bench.checking.examine import Examination
 from bench.checking.finding import Finding
 from bench.checking.line import directions
+from bench.checking.reading import ZERO
 from problems.errors import RoutesError
 
 COUNT = 3  # random directions of complex steps
@@ -54,5 +55,7 @@ def complex_steps(seen: Examination) -> Iterator[Finding]:
     except RoutesError as failure:
         yield Finding("complex step", float("nan"), COMPLEX, str(failure))
         return
-    off = float(np.linalg.norm(V.T @ seen.gradient - exact) / (np.linalg.norm(exact) or 1.0))
+    size, change = float(np.linalg.norm(exact)), max((r.change for r in seen.readings), default=0.0)
+    scale = size if size > ZERO * change else change  # at a minimum slopes are rounding
+    off = float(np.linalg.norm(V.T @ seen.gradient - exact)) / (scale or 1.0)
     yield Finding("complex step", off, max(COMPLEX, subject.accuracy), f"{COUNT} directions")

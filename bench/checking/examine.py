@@ -118,4 +118,5 @@ class Examination:
         sigma = self.readings[0].noise if alone else max(noise(made, self.J.eps, self.repeated), self.remembers)
         by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
         changes = stencil_changes(self.subject, made.line.v)
-        return Reading(made, sigma, self.size, self.accepted, by_nature, changes)
+        natural_change = self.readings[0].change if self.readings else 0.0
+        return Reading(made, sigma, self.size, self.accepted, by_nature, changes, natural_change)

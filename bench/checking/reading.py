@@ -32,6 +32,7 @@ class Reading:
     size     |g w|_2, what slopes along natural changes are to be compared with
     accepted relative error that is none
     by_nature error of slopes that is none: of gradients made of differences, say, which know nothing of components
+    natural_change  what J was seen to change by in natural steps along another line
     changes  step -> how often the active set changes inside its stencil, where the subject knows
     """
 
@@ -41,6 +42,7 @@ class Reading:
     accepted: float
     by_nature: float = 0.0
     changes: Callable[[float], int] | None = None
+    natural_change: float = 0.0
 
     @cached_property
     def level(self) -> Level | None:
@@ -69,11 +71,12 @@ class Reading:
         is zero up to rounding, as at a minimum, they are relative to what J changes by in natural steps.
         """
         own = abs(self.slope) if self.quotient is None else max(abs(self.slope), abs(self.quotient))
-        known = self.level is not None and self.level.uncertainty <= RESOLVED * own
+        change = max(self.change, self.natural_change)
+        known = self.level is not None and self.level.uncertainty <= RESOLVED * own and own > ZERO * change
         if known and self.sweep.line.index is not None:
             return own
         whole = max(self.size, own)
-        return whole if whole > ZERO * self.change else self.change
+        return whole if whole > ZERO * change else change
 
     @cached_property
     def change(self) -> float:
