@@ -16,6 +16,7 @@ from bench.foreign_output import stdout_to_stderr
 from problems.errors import InputError, NotConverged, SingularMatrix
 
 if TYPE_CHECKING:
+    from bench.checking.plan import Plan
     from problems.problem import Problem
     from routes.newton import Solver
 
@@ -102,24 +103,17 @@ def _components(text: str, n_p: int) -> int | tuple[int, ...]:
         if not first.isdecimal() or (dots and not last.isdecimal()):
             raise InputError(f"--components {text}: {item!r} is no number - write 3 (how many) or 2,5..7 (which)")
         start, stop = (int(number[:LONGEST]) for number in (first, last or first))
-        if start > stop or (("," in text or dots) and stop > n_p):
-            raise InputError(f"--components {text}: {item.strip()} is not within 1 to {n_p} - choose among them")
+        if not 1 <= start <= stop <= n_p:
+            raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")
         numbers += range(start, stop + 1)
     if "," not in text and ".." not in text:
-        if not 1 <= numbers[0] <= n_p:
-            raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")
         return numbers[0]
-    outside = [i for i in numbers if not 1 <= i <= n_p]
-    if outside or not numbers:
-        raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")
     return tuple(dict.fromkeys(i - 1 for i in numbers))
 
 
-def _refuse_beyond(budget: float, seconds: float, plan: object) -> None:
+def _refuse_beyond(budget: float, seconds: float, plan: Plan) -> None:
     from bench.bill import duration
-    from bench.checking.plan import Plan
 
-    assert isinstance(plan, Plan)
     few = plan.components if isinstance(plan.components, int) else len(plan.components)
     calls = 2 * len(plan.steps) * (few + plan.directions)
     if calls * seconds > budget:
