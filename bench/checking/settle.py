@@ -81,8 +81,8 @@ def _again(seen: Examination, reading: Reading, factor: float) -> Tightened | st
     if tight.says == "nothing":
         return f"J tightened by {factor:g} is not to be had along {line.name}"
     moved = norm2((other.gradient - seen.gradient) * seen.subject.natural)
-    quotients = reading.quotient, tight.quotient
-    by = abs(quotients[0] - quotients[1]) if None not in quotients else float("nan")  # type: ignore[operator]
+    before, after = reading.quotient, tight.quotient
+    by = math.nan if before is None or after is None else abs(after - before)
     changed = other.J_0 != seen.J_0 or not np.array_equal(other.gradient, seen.gradient)
     return Tightened(factor, tight, _relative(moved, seen.size), _relative(by, reading.scale), changed)
 
