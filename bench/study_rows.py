@@ -32,7 +32,7 @@ CHECKS = (
     Column("noise", "REAL", "problem's", "standard deviation of one evaluation of J"),
     Column("plateau", "REAL", "1", "difference of gradient and quotients that no step removes"),
     Column("tightened_plateau", "REAL", "1", "the same with the forward solve tightened"),
-    Column("refined_plateau", "REAL", "1", "|(g - exact) w| / |exact w| of the whole gradient on a mesh of half the size"),
+    Column("refined_plateau", "REAL", "1", "|(g - exact) w| / |exact w| on a mesh of half the size"),
     Column("order_in_mesh_size", "REAL", "1", "k of a plateau ~ h^k"),
     Column("active_set_changes", "INTEGER", "1", "inside the stencil of the deciding line"),
     Column("culprit", "TEXT", "", "the factor, component or functional that is wrong"),
