@@ -12,13 +12,14 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-LIBRARIES = ("gradient-routes", "numpy", "scipy", "jax", "jaxlib", "scikit-fem", "pandas")
+Environment = dict[str, Any]
+LIBRARIES = ("gradient-routes", "numpy", "scipy", "jax", "jaxlib", "scikit-fem", "pyamg", "py-mkl-pardiso")
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "XLA_FLAGS", "JAX_PLATFORMS")
 
 
 @cache
-def environment() -> dict[str, Any]:
-    """What timings depend on, without a host name: equal machines give equal records."""
+def environment() -> Environment:
+    """What timings depend on, without a host name: equal machines give equal records, whatever a process loaded."""
     import numpy as np
 
     blas: Any = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
@@ -30,20 +31,20 @@ def environment() -> dict[str, Any]:
         "os": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
         "blas": f"{blas.get('name')} {blas.get('version')}",
-        "threads": _pools() | {name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ},
-        "versions": {name: _version(name) for name in LIBRARIES},
+        "threads": {name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ},
+        "versions": versions(),
     }
 
 
-def fingerprint(environment: dict[str, Any]) -> str:
+def fingerprint(environment: Environment) -> str:
     """A key that equal environments share."""
     return hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _pools() -> dict[str, int]:
-    from threadpoolctl import threadpool_info
-
-    return {pool["internal_api"]: pool["num_threads"] for pool in threadpool_info()}
+@cache
+def versions() -> dict[str, str | None]:
+    """Of the numerical libraries; None for what is not installed."""
+    return {name: _version(name) for name in LIBRARIES}
 
 
 def _version(name: str) -> str | None:

@@ -25,14 +25,20 @@ class Column:
     json: bool = False
 
 
+# settled by an answer; by a limit of the case or of the machine; by an error in what was run
+ANSWERED = ("ok", "skipped", "pruned")
+LIMITED = ("timeout", "out-of-memory")
+WRONG = ("not-converged", "non-finite", "failed", "crashed")
+STATUSES = (*ANSWERED, *LIMITED, *WRONG)
+
 COLUMNS = (
     Column("problem", "TEXT", "", "name of the problem"),
     Column("problem_options", "TEXT", "", "its options, defaults included", json=True),
     Column("route", "TEXT", "", "name of the route"),
     Column("route_options", "TEXT", "", "its options, as resolved for this case", json=True),
     Column("at", "TEXT", "", "the p it was computed at: start, true or a file"),
-    Column("status", "TEXT", "", "ok, skipped or failed"),
-    Column("reason", "TEXT", "", "why it was skipped or failed"),
+    Column("status", "TEXT", "", f"{', '.join(STATUSES)}"),
+    Column("reason", "TEXT", "", "why it is not ok"),
     Column("note", "TEXT", "", "what should be read beside the numbers"),
     Column("n_state", "INTEGER", "1", "n_u, free unknowns"),
     Column("n_param", "INTEGER", "1", "n_p, parameters"),
@@ -44,15 +50,21 @@ COLUMNS = (
     Column("reference", "TEXT", "", "where g_ref comes from"),
     Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved by the forward solve"),
     Column("linear_solver", "TEXT", "", "factorization behind the forward solve"),
-    Column("prepare_s", "REAL", "s", "preparation: problem, imports, compilation"),
+    Column("prepare_s", "REAL", "s", "preparation: imports, mesh, symbolic analysis, compilation"),
     Column("first_s", "REAL", "s", "first call of the gradient"),
-    Column("seconds", "REAL", "s", "gradient, median of the steady calls"),
-    Column("seconds_min", "REAL", "s", "gradient, fastest steady call"),
-    Column("n_samples", "INTEGER", "1", "steady calls, each followed by a forward solve"),
+    Column("seconds", "REAL", "s", "gradient, median of the steady samples"),
+    Column("seconds_min", "REAL", "s", "gradient, fastest sample"),
+    Column("seconds_q1", "REAL", "s", "gradient, lower quartile of the samples"),
+    Column("seconds_q3", "REAL", "s", "gradient, upper quartile of the samples"),
+    Column("unstable", "INTEGER", "1", "1 where the quartiles are more than 10 % of the median apart"),
+    Column("n_samples", "INTEGER", "1", "rounds: a sample of the gradient, then one of forward solves"),
+    Column("calls_per_sample", "INTEGER", "1", "gradients a sample is the mean of, so that the clock can tell them"),
+    Column("interleaved", "INTEGER", "1", "cases on the problem whose rounds alternated, this one included"),
     Column("forward_s", "REAL", "s", "one forward solve, median over the same rounds"),
     Column("forward_ratio", "REAL", "1", "seconds / forward_s"),
     Column("peak_bytes", "INTEGER", "byte", "peak memory of one call above what was held before it"),
     Column("memory_method", "TEXT", "", "how peak_bytes was measured"),
+    Column("factor_bytes", "INTEGER", "byte", "what the factors behind the forward solve hold"),
     Column("tape_bytes", "INTEGER", "byte", "arrays AD holds between its forward and its backward sweep"),
     Column("tape_bytes_per_iteration", "REAL", "byte", "tape_bytes / iterations of unrolled routes"),
     Column("work", "TEXT", "1", "work counted during one call", json=True),
@@ -60,6 +72,17 @@ COLUMNS = (
     Column("predicted_s", "REAL", "s", "declared work priced by one measured forward solve"),
     Column("predicted_tape_bytes", "REAL", "byte", "tape the route declares"),
     Column("started", "TEXT", "UTC", "when the case began, ISO 8601"),
+    Column("settings", "TEXT", "", "of the solver, and other options of the run that a gradient depends on", json=True),
+    Column("isolated", "INTEGER", "1", "1 where it ran in a process of its own"),
+    Column("threads", "INTEGER", "1", "threads of BLAS, PARDISO and XLA, as limited"),
+    Column("budget_s", "REAL", "s", "predicted seconds beyond which it was to be skipped; NULL: none"),
+    Column("timeout_s", "REAL", "s", "wall time after which it was to be killed; NULL: none"),
+    Column("memory_cap_bytes", "INTEGER", "byte", "memory it was to be killed at; NULL: none"),
+    Column("host", "TEXT", "", "name of the machine it ran on"),
+    Column("stderr", "TEXT", "", "its last lines on stderr"),
+    Column("traceback", "TEXT", "", "of what it raised"),
+    Column("case_key", "TEXT", "", "hash of what was asked: problem, route, their options, settings"),
+    Column("content_key", "TEXT", "", "hash of that and of all it rests on: sources, data, versions, schema"),
 )
 
 KEYS = (
@@ -83,7 +106,7 @@ ENVIRONMENTS = (
     Column("os", "TEXT", "", "system, release, architecture"),
     Column("python", "TEXT", "", "version of Python"),
     Column("blas", "TEXT", "", "NumPy's BLAS and its version"),
-    Column("threads", "TEXT", "", "threads of every BLAS and OpenMP pool, and the variables that set them", json=True),
+    Column("threads", "TEXT", "", "the variables that set threads of BLAS, OpenMP and XLA", json=True),
     Column("versions", "TEXT", "", "versions of the numerical libraries", json=True),
 )
 

@@ -13,14 +13,14 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from bench.environment import environment, fingerprint
+from bench.environment import Environment, environment, fingerprint
 from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED, Column, Row, as_record, from_record, stored
 from bench.study_rows import KEY, STUDIES, STUDY
 from bench.timing import Samples
 from problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
-SCHEMA = 3  # 2: columns partial and tape_bytes_per_iteration; 3: tables of studies
+SCHEMA = 4  # 2: columns partial and tape_bytes_per_iteration; 3: tables of studies; 4: processes, limits, keys
 PATIENCE = 60.0  # [s] to wait for another writer
 TABLES: dict[str, tuple[Column, ...]] = {
     "cases": (KEYS[0], KEYS[1], *STORED),
@@ -42,12 +42,12 @@ class Store:
         with self._transaction() as db:
             self._environment_id(db)
 
-    def append(self, row: Row, samples: Samples | None) -> None:
-        """Keep a row and its raw timings, all or nothing."""
+    def append(self, row: Row, samples: Samples | None, measured_in: Environment | None = None) -> None:
+        """Keep a row and its raw timings, all or nothing, and the environment of its process, this one's if None."""
         with self._transaction() as db:
             names = ", ".join(["environment_id", *(c.name for c in STORED)])
             marks = ", ".join("?" * (1 + len(STORED)))
-            values = (self._environment_id(db), *as_record(row))
+            values = (self._environment_id(db, measured_in), *as_record(row))
             case_id = db.execute(f"INSERT INTO cases ({names}) VALUES ({marks})", values).lastrowid
             if samples is not None:
                 kinds = (("gradient", samples.gradient), ("forward", samples.forward))
@@ -57,8 +57,9 @@ class Store:
     def append_study(self, tables: Mapping[str, Sequence[Row]], started: str) -> int:
         """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""
         with self._transaction() as db:
-            values = (next(iter(tables)), self._environment_id(db), started)
-            cursor = db.execute("INSERT INTO studies (study, environment_id, started) VALUES (?, ?, ?)", values)
+            values = (next(iter(tables)), self._environment_id(db), started, "ok")
+            names = "study, environment_id, started, status"
+            cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?)", values)
             study_id = int(cursor.lastrowid or 0)
             for name, rows in tables.items():
                 columns = STUDIES[name]
@@ -127,10 +128,11 @@ class Store:
         """What an older schema lacks is added, absent in its rows."""
         if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
             self._create_tables(db)
-            there = {column[1] for column in db.execute("PRAGMA table_info(cases)")}
-            for column in STORED:
-                if column.name not in there:
-                    db.execute(f"ALTER TABLE cases ADD COLUMN {column.name} {column.type}")
+            for name, columns in TABLES.items():
+                there = {column[1] for column in db.execute(f"PRAGMA table_info({name})")}
+                for column in columns:
+                    if column.name not in there:
+                        db.execute(f"ALTER TABLE {name} ADD COLUMN {column.name} {column.type}")
             db.execute(f"PRAGMA user_version = {SCHEMA}")
 
     def _check_kind(self, db: sqlite3.Connection) -> None:
@@ -143,8 +145,8 @@ class Store:
             )
 
     @staticmethod
-    def _environment_id(db: sqlite3.Connection) -> str:
-        here = environment()
+    def _environment_id(db: sqlite3.Connection, measured_in: Environment | None = None) -> str:
+        here = measured_in or environment()
         values = [json.dumps(here[c.name]) if c.json else here[c.name] for c in ENVIRONMENTS[1:]]
         marks = ", ".join("?" * len(ENVIRONMENTS))
         key = fingerprint(here)

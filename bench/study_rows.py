@@ -10,6 +10,9 @@ STUDY = (
     Column("study", "TEXT", "", "name of the table that holds its rows"),
     Column("environment_id", "TEXT", "", "of the row in environments"),
     Column("started", "TEXT", "UTC", "when it began, ISO 8601"),
+    Column("status", "TEXT", "", "ok, or what ended it before it was done: timeout, out-of-memory, crashed"),
+    Column("reason", "TEXT", "", "why it is not ok"),
+    Column("stderr", "TEXT", "", "the last lines on stderr of one that is not ok"),
 )
 
 WHAT = (
