@@ -44,12 +44,15 @@ class Judge:
 class Judges:
     """References for one problem at one p, each computed once, when first asked for.
 
-    `unaffordable` says of a route why its bill for so many parameters is not paid, or None.
+    `unaffordable` says of a route why its bill for so many parameters is not paid, or None. `found` is what was found
+    before, in another process say; what is found here is added to it.
     """
 
-    def __init__(self, model: Model, p: Array, unaffordable: Callable[[Route, int], str | None]) -> None:
+    def __init__(
+        self, model: Model, p: Array, unaffordable: Callable[[Route, int], str | None], found: Found | None = None
+    ) -> None:
         self.model, self.p, self.unaffordable = model, p, unaffordable
-        self._found: dict[tuple[str, bool], Judge | str] = {}
+        self.found: Found = {} if found is None else found
 
     def judge(self, route: Route) -> Judge | str:
         """The problem's own reference, or another exact route's gradient, in full where n_p is small and it can be
@@ -59,9 +62,9 @@ class Judges:
         for name, whole in self._candidates():
             if name == route.name:
                 continue
-            if (name, whole) not in self._found:
-                self._found[name, whole] = self._ask(name, whole)
-            found = self._found[name, whole]
+            if (name, whole) not in self.found:
+                self.found[name, whole] = self._ask(name, whole)
+            found = self.found[name, whole]
             if isinstance(found, Judge):
                 return found
             reasons[name] = found
@@ -139,6 +142,7 @@ class Judges:
 
 
 OWN = "its own reference"
+Found = dict[tuple[str, bool], Judge | str]  # by the name of the judge, and whether it judges the whole
 
 
 def error(gradient: Array, reference: Reference) -> tuple[float, str]:

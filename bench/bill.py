@@ -9,6 +9,7 @@ from typing import Any
 
 from bench.memory import available_bytes
 from bench.timing import seconds_of
+from bench.units import duration, size
 from problems.problem import Array, Offers
 from routes.forward_work import ForwardWork
 from routes.model import Model
@@ -85,20 +86,3 @@ def summary(work: Work) -> str:
         (work.matvecs, "mv"),
     )
     return " + ".join(f"{count if count < 1e6 else f'{count:.2g}'} {name}" for count, name in parts if count > 0)
-
-
-def duration(seconds: float) -> str:
-    """Seconds as a person reads them."""
-    for unit, length in (("y", 365.25 * 86400), ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0), ("ms", 1e-3)):
-        if seconds >= length:
-            return f"{seconds / length:.3g} {unit}"
-    return f"{seconds * 1e6:.3g} us"
-
-
-def size(count: float) -> str:
-    """Bytes as a person reads them."""
-    for unit in ("B", "KiB", "MiB", "GiB"):
-        if count < 1000:
-            return f"{count:.3g} {unit}"
-        count /= 1024
-    return f"{count:.3g} TiB"

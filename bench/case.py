@@ -24,6 +24,9 @@ class ProblemSpec:
     options: dict[str, Any]
     build: Any
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return problem_named, (self.name, self.options)  # code is found by its name wherever it is sent
+
     def __call__(self) -> Problem:
         problem = self.build(**self.options)
         if not isinstance(problem, Problem) or not isinstance(problem.parameters, Parameters):
@@ -35,8 +38,22 @@ class ProblemSpec:
 class RouteSpec:
     """A route with its options as given; data-dependent defaults are still open (None)."""
 
+    name: str
     route: Route
     options: dict[str, Any]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return route_named, (self.name, self.options)
+
+
+def problem_named(name: str, options: dict[str, Any]) -> ProblemSpec:
+    """Raises InputError for a name that is not known here."""
+    return ProblemSpec(name, options, registry.find("problem", name).load())
+
+
+def route_named(name: str, options: dict[str, Any]) -> RouteSpec:
+    """Raises InputError for a name that is not known here."""
+    return RouteSpec(name, registry.find("route", name).load(), options)
 
 
 def problems(selectors: Iterable[str]) -> list[ProblemSpec]:
@@ -46,7 +63,7 @@ def problems(selectors: Iterable[str]) -> list[ProblemSpec]:
 
 def routes(selectors: Iterable[str]) -> list[RouteSpec]:
     """All routes that the selectors name, grids expanded. Raises InputError."""
-    specs = [RouteSpec(target, opts) for _, opts, target in _specs("route", selectors)]
+    specs = [RouteSpec(name, target, opts) for name, opts, target in _specs("route", selectors)]
     for spec in specs:
         spec.route.check(**spec.options)
     return specs
@@ -91,6 +108,12 @@ def point(problem: Problem, at: str) -> Array:
     if len(columns) != 1:
         raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
     return problem.parameters.check(next(iter(columns.values())), at)
+
+
+def sized(spec: ProblemSpec, at: str) -> tuple[int, int]:
+    """n_u and n_p of a problem, built without its synthetic data. Raises as its factory and `point` do."""
+    problem = spec.build(**spec.options)
+    return problem.n_state, len(point(problem, "start" if at == "true" else at))
 
 
 def files(specs: Iterable[ProblemSpec], at: str) -> list[Path]:

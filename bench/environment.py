@@ -6,11 +6,12 @@ import hashlib
 import json
 import os
 import platform
-import sys
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from bench.memory import total_bytes
 
 Environment = dict[str, Any]
 LIBRARIES = ("gradient-routes", "numpy", "scipy", "jax", "jaxlib", "scikit-fem", "pyamg", "py-mkl-pardiso")
@@ -27,7 +28,7 @@ def environment() -> Environment:
         "cpu": _cpu(),
         "cores": os.cpu_count(),
         "usable_cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "memory_bytes": _memory(),
+        "memory_bytes": total_bytes(),
         "os": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
         "blas": f"{blas.get('name')} {blas.get('version')}",
@@ -60,9 +61,3 @@ def _cpu() -> str:
         return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or platform.machine()
-
-
-def _memory() -> int | None:
-    if sys.platform == "win32":
-        return None
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

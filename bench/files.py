@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.outcome import Outcome
 from bench.partial import Partial
-from bench.runner import Outcome
 from problems.errors import InputError
 
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from bench.outcome import View
 from bench.rows import Row
-from bench.runner import View
 from bench.views.tables import named
 
 AXES = ("x", "y", "z")

@@ -46,6 +46,14 @@ def available_bytes() -> int | None:
     return max(0, min(amounts)) if amounts else None
 
 
+def total_bytes() -> int | None:
+    """Memory of the machine; None where it does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
 def _return_freed_memory() -> None:
     """What glibc keeps of freed memory would be reused unseen."""
     if sys.platform == "linux":

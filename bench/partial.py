@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from bench.bill import size
 from bench.memory import available_bytes
+from bench.units import size
 from problems.errors import InputError
 from problems.problem import Array, Problem
 from problems.restricted import Restricted, components, directions

@@ -7,7 +7,9 @@ wait for each other.
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -17,6 +19,7 @@ from bench.environment import Environment, environment, fingerprint
 from bench.rows import ENVIRONMENTS, KEYS, SAMPLES, STORED, Column, Row, as_record, from_record, stored
 from bench.study_rows import KEY, STUDIES, STUDY
 from bench.timing import Samples
+from bench.units import now
 from problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
@@ -38,9 +41,21 @@ class Store:
         self.path = Path(path)
 
     def check_writable(self) -> None:
-        """Raise InputError now rather than after the first case."""
-        with self._transaction() as db:
-            self._environment_id(db)
+        """Raise InputError now rather than after the first case. What is not there yet is not made."""
+        with self._errors():
+            self._refuse_folder()
+            try:
+                os.stat(self.path)
+            except FileNotFoundError:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                tempfile.TemporaryFile(dir=self.path.parent).close()
+                return
+        with self._transaction():
+            pass
+
+    def _refuse_folder(self) -> None:
+        if self.path.is_dir():
+            raise InputError(f"store {self.path}: is a directory - name a file in it: {self.path}/routes.sqlite")
 
     def append(self, row: Row, samples: Samples | None, measured_in: Environment | None = None) -> None:
         """Keep a row and its raw timings, all or nothing, and the environment of its process, this one's if None."""
@@ -69,8 +84,42 @@ class Store:
                 db.executemany(f"INSERT INTO {name} ({names}) VALUES ({marks})", records)
             return study_id
 
+    def append_ended(self, study: str, status: str, reason: str, stderr: str) -> None:
+        """Keep that a study was ended before it was done."""
+        with self._transaction() as db:
+            values = (study, self._environment_id(db), now(), status, reason, stderr)
+            names = "study, environment_id, started, status, reason, stderr"
+            db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
+
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
+        with self._reading() as db:
+            if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
+                return [c.name for c in TABLES[name]], []  # a store of an older schema
+            cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
+            return [d[0] for d in cursor.description], cursor.fetchall()
+
+    def rows(self) -> list[Row]:
+        """The cases as rows again."""
+        names, records = self.table("cases")
+        return [from_record(dict(zip(names, record, strict=True))) for record in records]
+
+    def latest(self, case_key: str | None = None) -> dict[str, Row]:
+        """The newest row of every case by its case_key, or of the one given; none where there is no store yet."""
+        if not self.path.is_file() or self.path.stat().st_size == 0:
+            return {}
+        one = "" if case_key is None else "AND case_key = :case_key"
+        newest = f"SELECT max(case_id) FROM cases WHERE case_key NOT NULL {one} GROUP BY case_key"
+        with self._reading() as db:
+            if "case_key" not in {column[1] for column in db.execute("PRAGMA table_info(cases)")}:
+                return {}  # of an older schema
+            cursor = db.execute(f"SELECT * FROM cases WHERE case_id IN ({newest})", {"case_key": case_key})
+            names = [d[0] for d in cursor.description]
+            rows = [from_record(dict(zip(names, record, strict=True))) for record in cursor]
+        return {row["case_key"]: row for row in rows}
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
         with self._errors():
             if not self.path.is_file():
                 raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
@@ -78,21 +127,12 @@ class Store:
                 if not self._has_tables(db):
                     raise InputError(f"store {self.path}: is empty - run `routes run` first, or name another")
                 self._check_kind(db)
-                if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
-                    return [c.name for c in TABLES[name]], []  # a store of an older schema
-                cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
-                return [d[0] for d in cursor.description], cursor.fetchall()
-
-    def rows(self) -> list[Row]:
-        """The cases as rows again."""
-        names, records = self.table("cases")
-        return [from_record(dict(zip(names, record, strict=True))) for record in records]
+                yield db
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
         with self._errors():
-            if self.path.is_dir():
-                raise InputError(f"store {self.path}: is a directory - name a file in it: {self.path}/routes.sqlite")
+            self._refuse_folder()
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with closing(sqlite3.connect(self._uri("rwc"), uri=True, timeout=PATIENCE, isolation_level=None)) as db:
                 db.execute("BEGIN IMMEDIATE")
@@ -123,16 +163,17 @@ class Store:
         """Those that are not there yet."""
         for name, columns in TABLES.items():
             db.execute(f"CREATE TABLE IF NOT EXISTS {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
+        db.execute("CREATE INDEX IF NOT EXISTS by_case ON cases (case_key)")
 
     def _migrate(self, db: sqlite3.Connection) -> None:
         """What an older schema lacks is added, absent in its rows."""
         if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
-            self._create_tables(db)
             for name, columns in TABLES.items():
                 there = {column[1] for column in db.execute(f"PRAGMA table_info({name})")}
                 for column in columns:
-                    if column.name not in there:
+                    if there and column.name not in there:
                         db.execute(f"ALTER TABLE {name} ADD COLUMN {column.name} {column.type}")
+            self._create_tables(db)
             db.execute(f"PRAGMA user_version = {SCHEMA}")
 
     def _check_kind(self, db: sqlite3.Connection) -> None:

@@ -1,29 +1,49 @@
-"""The one timer: steady calls in rounds, each followed by a forward solve, so that their ratio is of one run."""
+"""The one timer: samples of a gradient and of forward solves in turn, so that their ratio is of one run."""
 
 from __future__ import annotations
 
 import gc
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from statistics import median
+from statistics import median, quantiles
 from typing import Any
 
-ENOUGH_ROUNDS = 200
+LONG = 1.0  # [s] gradients that take longer are timed once, not repeated
+SAMPLE = 1e-3  # [s] of a sample: the clock and the call of a function are nothing beside it
+LEAST, MOST = 5, 100  # rounds, where --min-time asks for any repeats at all
+TURNS = 5  # in which a case has its rounds, others having theirs between
+SPREAD = 0.10  # of the median, between the quartiles: beyond, a timing is not to be relied upon
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Seconds of each round's gradient and forward solve."""
+    """Seconds of one call: each round's mean over `calls` gradients, and over forward solves."""
 
     gradient: tuple[float, ...]
     forward: tuple[float, ...]
+    calls: int = 1
 
     @property
     def ratio(self) -> float:
         """median(gradient) / median(forward)."""
         return median(self.gradient) / median(self.forward)
+
+    @property
+    def quartiles(self) -> tuple[float, float]:
+        """Of the gradient's samples."""
+        if len(self.gradient) < 2:
+            return self.gradient[0], self.gradient[0]
+        lower, _, upper = quantiles(self.gradient, n=4, method="inclusive")
+        return lower, upper
+
+    @property
+    def unstable(self) -> bool | None:
+        """Whether the quartiles are more than SPREAD of the median apart; None where too few to tell."""
+        lower, upper = self.quartiles
+        return None if len(self.gradient) < LEAST else upper - lower > SPREAD * median(self.gradient)
 
 
 def seconds_of(call: Callable[[], Any]) -> tuple[float, Any]:
@@ -33,20 +53,76 @@ def seconds_of(call: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - start, result
 
 
+class Rounds:
+    """Samples of a gradient, each followed by one of forward solves, until the gradient has run for `min_time` s.
+
+    Calls a sample are calibrated by three more. min_time 0: one round of one call.
+    """
+
+    def __init__(self, gradient: Callable[[], Any], forward: Callable[[], Any], first_s: float, min_time: float):
+        self._gradient, self._forward, self._min_time = gradient, forward, min_time
+        self.long = first_s >= LONG
+        self._least = LEAST if min_time > 0.0 and not self.long else 1
+        self._repeats: tuple[int, int] | None = None
+        self._samples: list[tuple[float, float]] = []
+
+    @property
+    def enough(self) -> bool:
+        spent = math.fsum(g for g, _ in self._samples) * self._calls[0]
+        rounds = len(self._samples)
+        return rounds >= self._least and (spent >= self._min_time or self.long)
+
+    def turn(self) -> bool:
+        """Rounds for a while, with the garbage collector off; whether more are wanted."""
+        if not self._samples:
+            gc.collect()
+        with no_garbage_collection():
+            gradients, forwards = self._calls
+            until = time.perf_counter() + 2.0 * self._min_time / TURNS  # half of that is the forward solves'
+            while not self.enough:
+                self._samples.append((mean_of(self._gradient, gradients), mean_of(self._forward, forwards)))
+                if time.perf_counter() >= until:
+                    break
+        return not self.enough
+
+    @property
+    def samples(self) -> Samples:
+        gradients, forwards = zip(*self._samples, strict=True)
+        return Samples(gradients, forwards, self._calls[0])
+
+    @property
+    def _calls(self) -> tuple[int, int]:
+        """Gradients and forward solves a sample."""
+        if self._repeats is None:
+            once, sample = self.long or self._min_time == 0.0, max(SAMPLE, self._min_time / MOST)
+            self._repeats = (1, 1) if once else (repeats(self._gradient, sample), repeats(self._forward, sample))
+        return self._repeats
+
+
+def repeats(call: Callable[[], Any], seconds: float) -> int:
+    """Calls that fill them."""
+    return max(1, math.ceil(seconds / max(mean_of(call, 3), 1e-9)))
+
+
+def mean_of(call: Callable[[], Any], calls: int) -> float:
+    """Seconds of one of so many calls in a row."""
+    start = time.perf_counter()
+    for _ in range(calls):
+        call()
+    return (time.perf_counter() - start) / calls
+
+
 def rounds(gradient: Callable[[], Any], forward: Callable[[], Any], min_time: float) -> Samples:
-    """Alternate the two until the gradient has run for `min_time` seconds; at least 1 round, at most ENOUGH_ROUNDS."""
-    samples: list[tuple[float, float]] = []
-    with no_garbage_collection():
-        while not samples or (sum(g for g, _ in samples) < min_time and len(samples) < ENOUGH_ROUNDS):
-            samples.append((seconds_of(gradient)[0], seconds_of(forward)[0]))
-    gradients, forwards = zip(*samples, strict=True)
-    return Samples(gradients, forwards)
+    """All rounds at once, of calls that are short."""
+    measured = Rounds(gradient, forward, 0.0, min_time)
+    while measured.turn():
+        pass
+    return measured.samples
 
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
     """Collections would fall into some rounds and not into others."""
-    gc.collect()
     enabled = gc.isenabled()
     gc.disable()
     try:

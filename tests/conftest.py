@@ -48,6 +48,7 @@ OPTIONS = {
     "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "unrolled-ad": [unrolled_ad.defaults | {"inner": i} for i in ("cg", "richardson", "jacobi", "direct")],
 }
+ISOLATING = {"run", "scaling", "check", "vcurve", "kink", "tolerance", "unrolling"}
 BARS = {
     "bar[n=1]": {"n": 1},
     "bar[n=2]": {"n": 2},
@@ -119,10 +120,12 @@ def garbage_of_this_test_only() -> Iterator[None]:
 
 @pytest.fixture
 def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """The command line, called in this process, in an empty folder."""
+    """The command line, called in this process, in an empty folder; verbs that would start others do not."""
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments: str) -> Ran:
+        if arguments[0] in ISOLATING and not {"--isolate", "--help", "-h"} & {*arguments}:
+            arguments = (*arguments, "--no-isolate")
         monkeypatch.setattr(sys, "argv", ["routes", *arguments])
         result = CliRunner().invoke(main, list(arguments))
         if result.exception is not None and not isinstance(result.exception, SystemExit):

@@ -20,7 +20,8 @@ def blocks(document: str, language: str) -> list[str]:
 
 
 def shape(text: str) -> list[list[str]]:
-    """A printed text without what changes from run to run: numbers, and the width of columns."""
+    """A printed text without what changes from run to run: numbers, marks of unstable ones, the width of columns."""
+    text = text.replace("~", "").replace(", : unstable", "")
     return [NUMBER.sub("#", line).split() for line in text.splitlines() if line.strip()]
 
 

@@ -35,7 +35,7 @@ by_rounding = pytest.mark.parametrize("law", ["softplus", "quadratic"])
 
 
 def spec(route: Route) -> RouteSpec:
-    return RouteSpec(route, dict(route.defaults))
+    return RouteSpec(route.name, route, dict(route.defaults))
 
 
 def ray(**options) -> Ray:

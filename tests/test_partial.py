@@ -13,8 +13,12 @@ from test_routes import ACCURACY, ZOO, differentiate, ids, pairs, reference
 from bench import accuracy
 from bench.accuracy import Judge, Judges, error
 from bench.case import ProblemSpec, RouteSpec
+from bench.executors.here import Here
+from bench.executors.running import alone
+from bench.measurement import begun_row
 from bench.partial import Partial
-from bench.runner import Settings, Workbench
+from bench.workbench import Settings, Workbench
+from bench.worker import Measure
 from problems.bar import Bar
 from problems.block import Block
 from problems.errors import DomainError, InputError
@@ -249,7 +253,10 @@ class BlackBox(Problem):
 
 
 def outcome(bench: Workbench, route: Route):
-    return bench.outcome(RouteSpec(route, route.defaults))
+    spec = RouteSpec(route.name, route, route.defaults)
+    job = Measure(bench.spec, spec, bench.settings, begun_row(bench.spec, spec, bench.settings), {})
+    case = Here(bench, job)
+    return case.prepared() or alone(case)
 
 
 def test_an_unknown_error_says_why() -> None:

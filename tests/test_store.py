@@ -156,7 +156,7 @@ def test_stores_that_are_none_are_refused(tmp_path: Path) -> None:
 
 def test_a_newer_schema_is_refused(tmp_path: Path) -> None:
     store = Store(tmp_path / "s.sqlite")
-    store.check_writable()
+    store.append(row(), None)
     with closing(sqlite3.connect(store.path)) as db:
         db.execute(f"PRAGMA user_version = {SCHEMA + 1}")
     for use in (store.check_writable, store.rows):

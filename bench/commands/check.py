@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bench.commands.limited import confined
 from bench.commands.shared import at_option, debug_option, refuse_given, solver_options, store_options
-from bench.commands.studying import no_plot_option, now, one_problem, writable
+from bench.commands.studying import no_plot_option, one_problem, writable
 from bench.commands.verdict import built, conclude, one_route, page_writable
 from bench.foreign_output import stdout_to_stderr
+from bench.units import now
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too 
 @click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
 @no_plot_option
 @store_options
+@confined()
 @debug_option
 def check(
     target: str | None,

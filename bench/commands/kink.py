@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bench.commands.limited import confined
 from bench.commands.shared import SELECTOR, at_option, checked, complain, debug_option, solver_options, store_options
-from bench.commands.studying import keep, no_plot_option, now, one_problem, writable
+from bench.commands.studying import keep, no_plot_option, one_problem, writable
 from bench.commands.verdict import built
+from bench.units import now
 from problems.errors import InputError, RoutesError
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ BUDGET = "Skip routes whose gradients are predicted to take more seconds; inf fo
 @no_plot_option
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
 @store_options
+@confined()
 @debug_option
 def kink(
     problem: str,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,10 +40,6 @@ def writable(kept: Path | None) -> None:
 
     if kept is not None:
         Store(kept).check_writable()
-
-
-def now() -> str:
-    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
 
 
 def echo_json(tables: Mapping[str, Sequence[Row]]) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from bench.commands.limited import confined
 from bench.commands.shared import (
     LINEAR_SOLVERS,
     SELECTOR,
@@ -22,11 +23,11 @@ from bench.commands.studying import (
     json_option,
     keep,
     no_plot_option,
-    now,
     one_problem,
     problem_option,
     writable,
 )
+from bench.units import now
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ TIGHT = 1e-12
 @no_plot_option
 @json_option
 @store_options
+@confined()
 @debug_option
 def tolerance(
     selector: str,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from bench.commands.limited import confined
 from bench.commands.shared import at_option, checked, debug_option, store_options
 from bench.commands.studying import (
     budget_option,
@@ -13,11 +14,11 @@ from bench.commands.studying import (
     json_option,
     keep,
     no_plot_option,
-    now,
     one_problem,
     problem_option,
     writable,
 )
+from bench.units import now
 
 INNER = "The iteration on the tape. [that of the route]"
 CHECKPOINT = "Beside that, keep every so-manieth iterate only."
@@ -35,6 +36,7 @@ WITHIN = "Errors of implicit-ad that the gradient may have to have met it."
 @no_plot_option
 @json_option
 @store_options
+@confined()
 @debug_option
 def unrolling(
     selector: str,

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bench.commands.limited import confined
 from bench.commands.shared import at_option, checked, debug_option, solver_options, store_options
-from bench.commands.studying import no_plot_option, now, one_problem, writable
+from bench.commands.studying import no_plot_option, one_problem, writable
 from bench.commands.verdict import built, conclude, one_route, page_writable
 from bench.foreign_output import stdout_to_stderr
+from bench.units import now
 from problems.errors import InputError, NotConverged, SingularMatrix
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ BUDGET = "Refuse what is predicted to take more seconds; inf forces it."
 @click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there.")
 @no_plot_option
 @store_options
+@confined()
 @debug_option
 def vcurve(
     problem: str,
@@ -112,7 +115,7 @@ def _components(text: str, n_p: int) -> int | tuple[int, ...]:
 
 
 def _refuse_beyond(budget: float, seconds: float, plan: Plan) -> None:
-    from bench.bill import duration
+    from bench.units import duration
 
     few = plan.components if isinstance(plan.components, int) else len(plan.components)
     calls = 2 * len(plan.steps) * (few + plan.directions)

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.accuracy import Judge
 from bench.case import ProblemSpec
-from bench.runner import Settings, Workbench
+from bench.workbench import Settings, Workbench
 from problems.errors import RoutesError
 from routes.newton import Solver
 from routes.route import Result, Route

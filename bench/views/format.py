@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.bill import duration, size
+from bench.units import duration, size
 
 
 def number(value: float | None, digits: int = 3) -> str:

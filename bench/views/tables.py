@@ -14,8 +14,8 @@ from rich.text import Text
 from bench import registry
 from bench.bill import LEGEND, summary
 from bench.options import options_of
-from bench.rows import Row
-from bench.runner import View
+from bench.outcome import View
+from bench.rows import ANSWERED, Row
 from bench.selector import written
 from bench.views.format import bytes_, number, ratio, seconds
 from bench.views.palette import route_style
@@ -24,6 +24,7 @@ from routes.tally import Work
 
 PIPED_WIDTH = 160  # columns where there is no terminal to ask
 RESOLUTION = 2**20  # bytes; pages of allocators and interpreters come and go below
+LAST_WORDS = ("crashed", "timeout", "out-of-memory")  # no exception tells what it was: its stderr may
 MANY = 64  # parameters; longer views show both ends
 
 
@@ -74,7 +75,7 @@ def references(rows: Sequence[Row]) -> list[str]:
 
 
 def _style(row: Row) -> str:
-    return {"ok": "", "skipped": "dim"}.get(row["status"], "bold red")
+    return {"ok": "", "skipped": "dim", "pruned": "dim"}.get(row["status"], "bold red")
 
 
 def _cells(row: Row) -> list[Text]:
@@ -83,7 +84,7 @@ def _cells(row: Row) -> list[Text]:
         cells += [
             number(row["objective"], 4),
             number(row["gradient_error"], 2) or "unknown",
-            seconds(row["seconds"]),
+            ("~" if row["unstable"] else "") + seconds(row["seconds"]),
             ratio(row["forward_ratio"]),
             _work(row, "work"),
             bytes_(row["peak_bytes"], RESOLUTION),
@@ -122,9 +123,10 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
     """A legend, reasons of skipped and failed cases, then notes, each once."""
     judges = references(rows)
     against = f" against the {judges[0]}" if len(judges) == 1 else ""
+    unstable = ", ~: unstable" if any(row["unstable"] for row in rows) else ""
     legend = (
         f"n_u unknowns, n_p parameters; error: |g - g_ref| / |g_ref|{against}; time: one gradient, x fwd: in forward"
-        f" solves\nwork: {LEGEND}; memory: peak of one call; tape: kept by AD for its backward sweep"
+        f" solves{unstable}\nwork: {LEGEND}; memory: peak of one call; tape: kept by AD for its backward sweep"
     )
     lines = {"": Text(legend, style="dim")}
     problems = {id(row): named("problem", row) for row in rows}
@@ -134,7 +136,10 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
             where = f"{problems[id(row)]}: " if several else ""
             route = "" if row["reason"].startswith(row["route"]) else f"{row['route']}: "
             line = f"{row['status']}: {where}{route}{row['reason']}"
-            lines.setdefault(line, Text(line, style="dim" if row["status"] == "skipped" else "red"))
+            lines.setdefault(line, Text(line, style="dim" if row["status"] in ANSWERED else "red"))
+            if row["status"] in LAST_WORDS and row["stderr"]:
+                last = "\n".join(f"  | {said}" for said in row["stderr"].splitlines()[-3:])
+                lines.setdefault(f"{line}\n{last}", Text(last, style="dim"))
     for row in rows:
         for note in filter(None, (row["note"] or "").split("; ")):
             line = f"note: {problems[id(row)]}: {note}"

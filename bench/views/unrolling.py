@@ -8,8 +8,8 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from bench.bill import size
 from bench.rows import Row
+from bench.units import size
 from bench.views import tables
 from bench.views.format import bytes_, number, ratio, seconds
 from bench.views.palette import route_style

@@ -1,0 +1,149 @@
+"""Limits on what a verb runs: options, and the verb in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bench.commands.shared import Command, complain, refuse_given
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from bench.isolation.limits import Limits
+
+FAILED, INTERRUPTED = 1, 130
+GRACE = 5.0  # [s] between an interrupt and the end of what does not react to it
+INSIDE = "inside"  # the context's object in a process that is confined already
+ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
+TIMEOUT = "Seconds of wall time, after which {} is killed with all it started; inf: none."
+MEMORY = "Resident memory at which it is killed: 4GiB, 500MB. [what the machine has]"
+THREADS = "Threads of BLAS, PARDISO and XLA each."
+AFFINITY = "Processors to stay on: 0 or 0,2-3. [any]"
+
+
+def limit_options(what: str, timeout: float) -> Callable[[Command], Command]:
+    """--isolate, --timeout, --memory, --threads, --affinity; the command gets `isolate` and `limits`."""
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def with_limits(
+            *, isolate: bool, timeout: float, memory: str | None, threads: int, affinity: str | None, **others: Any
+        ) -> Any:
+            from bench.isolation import limits as given
+
+            if not isolate:
+                refuse_given(("timeout", "memory"), "holds for processes of their own, not with --no-isolate")
+            if isolate and os.name != "posix":
+                raise InputError("--isolate: needs pipes and process groups of POSIX - give --no-isolate here")
+            limits = given.Limits(
+                given.checked_timeout(timeout),
+                given.memory_of(memory),
+                given.checked_threads(threads),
+                given.affinity_of(affinity),
+            )
+            return command(isolate=isolate, limits=limits, **others)
+
+        options = (
+            click.option("--isolate/--no-isolate", default=True, show_default=True, help=ISOLATE),
+            click.option("--timeout", type=float, default=timeout, show_default=True, help=TIMEOUT.format(what)),
+            click.option("--memory", metavar="SIZE", help=MEMORY),
+            click.option("--threads", type=int, default=1, show_default=True, help=THREADS),
+            click.option("--affinity", metavar="LIST", help=AFFINITY),
+        )
+        decorated: Command = with_limits
+        for option in reversed(options):
+            decorated = option(decorated)
+        return decorated
+
+    return decorate
+
+
+def confined(timeout: float = 3600.0) -> Callable[[Command], Command]:
+    """The whole verb in a process of its own, this one watching. It writes where this one writes."""
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def apart(*, isolate: bool, limits: Limits, **others: Any) -> Any:
+            context = click.get_current_context()
+            if isolate and context.find_root().obj != INSIDE:
+                sys.exit(_watched(context.info_name or "", limits, others.get("kept")))
+            if not isolate:
+                pin(limits)
+            return command(**others)
+
+        return limit_options("it", timeout)(apart)
+
+    return decorate
+
+
+def pin(limits: Limits) -> None:
+    """Threads and processors of this very process."""
+    if "numpy" in sys.modules:
+        from threadpoolctl import threadpool_limits
+
+        threadpool_limits(limits.threads)
+    else:
+        os.environ.update(limits.environment)
+    if limits.affinity is not None:
+        os.sched_setaffinity(0, limits.affinity)
+
+
+def _watched(verb: str, limits: Limits, kept: Any) -> int:
+    """Its exit code. A limit is said in a line and kept as a study that came to nothing."""
+    from bench.isolation.process import Confined, Killed
+
+    given = json.dumps(asdict(limits) | {"timeout": None})
+    arguments = [given, str(os.getpid()), *sys.argv[1:]]
+    process = Confined("bench.isolation.command", arguments, limits, talkative=True)
+    deadline = time.monotonic() + limits.timeout
+    try:
+        process.watch(process.ended, deadline)
+    except Killed as limit:
+        complain(f"{verb}: {limit.status} {limit.reason} - raise the limit, or ask for less")
+        _keep(kept, verb, limit.status, limit.reason, process.stderr)
+        return FAILED
+    except KeyboardInterrupt:
+        return _interrupted(process)
+    code = process.process.wait()
+    if code < 0 or code > 130:
+        ending = process.ending()
+        complain(f"{verb}: {ending.status}: {ending.reason} - see what it says above")
+        _keep(kept, verb, ending.status, ending.reason, process.stderr)
+        return FAILED
+    process.kill()
+    return code
+
+
+def _interrupted(process: Any) -> int:
+    """The verb may still print and keep what it has."""
+    process.process.send_signal(signal.SIGINT)
+    try:
+        process.watch(process.ended, time.monotonic() + GRACE)
+    except BaseException:  # its time is over, or the user's patience
+        process.kill()
+    process.kill()
+    return INTERRUPTED
+
+
+def _keep(kept: Any, verb: str, status: str, reason: str, stderr: str) -> None:
+    from bench.store import Store
+
+    if kept is not None:
+        try:
+            Store(kept).append_ended(verb, status, reason, stderr)
+        except InputError as error:
+            complain(f"not kept: {error}")
+
+
+def finite(seconds: float) -> float | None:
+    return seconds if math.isfinite(seconds) else None

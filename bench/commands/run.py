@@ -1,0 +1,240 @@
+"""`routes run`: gradients by every route named on every problem named, what they cost and how wrong they are."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from bench.commands.limited import limit_options, pin
+from bench.commands.shared import (
+    SELECTOR,
+    at_option,
+    checked,
+    complain,
+    debug_option,
+    debugging,
+    refuse_given,
+    solver_options,
+    store_options,
+)
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from bench.isolation.limits import Limits
+    from bench.outcome import Outcome, View
+    from bench.rows import Row
+    from bench.runner import How
+    from bench.store import Store
+    from routes.newton import Solver
+
+Only = Literal["missing", "failed", "stale", "all"]
+SHOWN = "-"  # --gradient without a file
+GRADIENT = "Show the gradient parameter by parameter beside its reference; with a file, write that as CSV instead."
+COMPONENTS = "Only so many components of dJ/dp, drawn at random: the bill of each, and its error."
+DIRECTIONS = "Only the slopes of J along so many random directions."
+VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView; for one problem and one route."
+BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
+TIMING = "Without, gradients are computed and judged, their work counted and memory read, but not timed."
+JOBS = "Cases side by side; for --no-timing only, they are in each other's way."
+RESUME = "Only cases that the store lacks, that failed, or whose code, data or libraries have changed."
+ONLY = "The same for cases of one kind; all: each again."
+
+
+@click.command()
+@click.option("--problem", "problems", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
+@click.option("--route", "routes", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
+@at_option
+@click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
+@click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
+@click.option("--timing/--no-timing", "timed", default=True, show_default=True, help=TIMING)
+@solver_options
+@click.option("--components", type=int, metavar="M", help=COMPONENTS)
+@click.option("--directions", type=int, metavar="M", help=DIRECTIONS)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
+@click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
+@click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
+@click.option("--resume", is_flag=True, help=RESUME)
+@click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
+@limit_options("a case", 600.0)
+@click.option("--jobs", type=int, default=1, show_default=True, help=JOBS)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
+@store_options
+@debug_option
+def run(
+    problems: tuple[str, ...],
+    routes: tuple[str, ...],
+    at: str,
+    budget: float,
+    min_time: float,
+    timed: bool,
+    solver: Solver,
+    components: int | None,
+    directions: int | None,
+    seed: int,
+    gradient: str | None,
+    vtu: Path | None,
+    resume: bool,
+    only: Only | None,
+    isolate: bool,
+    limits: Limits,
+    jobs: int,
+    as_json: bool,
+    kept: Path | None,
+) -> None:
+    """Compute dJ/dp by every route named, on every problem named; say what it cost and how wrong it is.
+
+    Every case runs in a process of its own; the routes on one problem are timed in turn, a forward solve beside every
+    sample. What goes wrong is a row with its reason.
+
+    Exit code: 0 all ok or skipped, 1 a case failed (its row says why), 2 wrong usage,
+    130 interrupted.
+    """
+    from bench import case
+    from bench.files import Files
+    from bench.partial import chosen
+    from bench.runner import How
+    from bench.runner import run as run_cases
+    from bench.store import Store
+    from bench.workbench import Settings
+
+    if not 0 <= min_time < float("inf"):
+        raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
+    partial = chosen(components, directions, seed)
+    how = _how(How(isolate, limits, jobs), timed)
+    problem_specs, route_specs = case.problems(problems), case.routes(routes)
+    files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
+    count = len(problem_specs) * len(route_specs)
+    files.check(count, partial, [*([kept] if kept else []), *case.files(problem_specs, at)])
+    for left_out in case.left_out(problems, routes):
+        complain(f"left out of 'all': {left_out}")
+    settings = Settings(at, checked(budget), min_time, timed, gradient is not None, solver, partial, vtu is not None)
+    store = None if kept is None else Store(kept)
+    wanted = _wanted(store, resume, only)
+    if store is not None:
+        store.check_writable()
+    outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
+    done = Done(store, as_json, views=gradient is not None or vtu is not None)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
+    try:
+        for outcome in with_progress(outcomes, count):
+            done.take(outcome)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
+    finally:  # an interrupt leaves what was measured on the screen, too
+        done.show(gradients=gradient == SHOWN)
+        said, failed = files.write(done.outcomes)
+        for line in said:
+            click.echo(line, err=as_json)
+    if resume or only:
+        complain(f"{len(done.outcomes)} of {count} cases were run, the others are done")
+    if done.lost:
+        failed.append(f"{len(done.lost)} of {len(done.outcomes)} rows were not kept: {done.lost[0]}")
+    if failed:
+        raise InputError("; ".join(failed))
+    if debugging():
+        click.echo("".join(outcome.row["traceback"] or "" for outcome in done.outcomes), err=True, nl=False)
+    if done.failures:
+        sys.exit(1)
+
+
+class Done:
+    """Outcomes as they come: kept, printed, and what of them the end still needs."""
+
+    def __init__(self, store: Store | None, as_json: bool, views: bool) -> None:
+        self.store, self.as_json, self._views = store, as_json, views
+        self.outcomes: list[Outcome] = []
+        self.lost: list[str] = []
+
+    def take(self, outcome: Outcome) -> None:
+        from bench.rows import as_json
+
+        try:
+            if self.store is not None:
+                self.store.append(outcome.row, outcome.samples, outcome.environment)
+        except InputError as error:  # a full disk, a lock: the row is printed all the same
+            self.lost.append(str(error))
+        if self.as_json:
+            click.echo(as_json(outcome.row))
+        slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
+        self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
+
+    def show(self, gradients: bool) -> None:
+        """The table, in the order asked for, and gradients where those were asked for."""
+        if self.as_json:
+            return
+        ordered = sorted(self.outcomes, key=lambda outcome: outcome.place)
+        views = [(o.row, o.view) for o in ordered if o.view is not None and gradients]
+        kept = None if self.store is None or self.lost else self.store.path
+        show([o.row for o in ordered], views, kept)
+
+    @property
+    def failures(self) -> list[Row]:
+        from bench.rows import ANSWERED
+
+        return [o.row for o in self.outcomes if o.row["status"] not in ANSWERED]
+
+
+def _how(how: How, timed: bool) -> How:
+    """Raises InputError for what does not go together."""
+    if how.jobs < 1:
+        raise InputError(f"--jobs {how.jobs} - give 1 or more")
+    if how.jobs > 1 and timed:
+        raise InputError(f"--jobs {how.jobs}: cases side by side spoil each other's timing - add --no-timing")
+    if how.jobs > 1 and not how.isolate:
+        raise InputError(f"--jobs {how.jobs}: needs processes - drop --no-isolate")
+    if not how.isolate:
+        pin(how.limits)
+    return how
+
+
+def _wanted(store: Store | None, resume: bool, only: Only | None) -> Callable[[Row], bool]:
+    from bench.resume import OPEN, still_open
+    from bench.runner import everything
+
+    if store is None:
+        refuse_given(("resume", "only"), "looks into a store, with --no-store there is none")
+    if store is None or only == "all" or not (resume or only):
+        return everything
+    return still_open(store, OPEN if only is None else (only,), lambda row: False)
+
+
+def _resumed() -> str:
+    """This command again, for what is left."""
+    given = [word for word in sys.argv[1:] if word != "--resume"]
+    return shlex.join(["routes", *given, "--resume"])
+
+
+def show(rows: list[Row], views: Iterable[tuple[Row, View]] = (), kept: Path | None = None) -> None:
+    """The table, the reasons and notes below it, the gradients where they were asked for."""
+    from bench.views import tables
+
+    if not rows:
+        return
+    out = tables.console()
+    tables.show(out, tables.results(rows))
+    for line in tables.remarks(rows):
+        out.print(line, soft_wrap=not out.is_terminal)
+    if kept is not None:
+        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
+    for row, view in views:
+        out.print()
+        tables.show(out, tables.gradient(row, view))
+
+
+def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
+    """A progress bar on a terminal for more than one case, nothing of the kind elsewhere."""
+    if count < 2 or not (sys.stderr.isatty() and sys.stdout.isatty()):
+        yield from outcomes
+        return
+    from rich.progress import track
+
+    from bench.views.tables import console
+
+    yield from track(outcomes, "cases", total=count, console=console(stderr=True), transient=True)

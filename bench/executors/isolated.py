@@ -1,0 +1,149 @@
+"""A case in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing import Pipe
+from typing import Any
+
+from bench.accuracy import Found
+from bench.environment import Environment
+from bench.executors.running import alone
+from bench.isolation.limits import Limits
+from bench.isolation.process import Confined, Killed
+from bench.outcome import Outcome, refused
+from bench.rows import Row
+from bench.worker import Job, Measure
+
+
+class Line:
+    """A confined worker doing a job, and the messages it sends."""
+
+    def __init__(self, job: Job, limits: Limits, cwd: str | None = None) -> None:
+        self._left = limits.timeout
+        self.connection, other = Pipe()
+        with other:
+            self.process = Confined(
+                "bench.worker",
+                [str(other.fileno())],
+                limits,
+                pass_fds=[other.fileno()],
+                cwd=cwd,
+                stdin=subprocess.DEVNULL,
+            )
+        with suppress(OSError):  # it is gone: hearing will tell
+            self.connection.send((limits, os.getpid(), sys.path))
+            self.connection.send(job)
+
+    def hear(self) -> tuple[str, Any]:
+        """Its next message. Raises Killed at a limit, EOFError where it has ended, with no word or a broken one."""
+        start = time.monotonic()
+        try:
+            self.process.watch(self.connection.poll, start + self._left)
+            kind, what = self.connection.recv()
+        except (EOFError, Killed):
+            raise
+        except Exception as broken:  # half a message, or one that cannot be read here
+            raise EOFError from broken
+        finally:
+            self._left -= time.monotonic() - start
+        return kind, what
+
+    def say(self, kind: str, what: Any = None) -> None:
+        """A dead worker is found out when it is heard."""
+        with suppress(OSError):
+            self.connection.send((kind, what))
+
+    def close(self) -> None:
+        """Whatever it and its children are at, it ends."""
+        self.process.kill()
+        self.connection.close()
+
+
+class Isolated:
+    """A case under way in a process of its own; what it has said is known whatever becomes of it."""
+
+    def __init__(self, job: Measure, limits: Limits, cwd: str | None = None) -> None:
+        self.found: Found = job.found
+        self.long = False
+        self._row: Row = job.row
+        self._phase = "starting"
+        self._environment: Environment | None = None
+        self._ended: Outcome | None = None
+        self._line = Line(job, limits, cwd)
+
+    def prepared(self) -> Outcome | None:
+        return self._until("ready")
+
+    def turn(self) -> bool:
+        if self._ended is None:
+            self._line.say("turn")
+            self._until("turned")
+        return self._ended is None and self._more
+
+    def outcome(self, interleaved: int) -> Outcome:
+        if self._ended is None:
+            self._line.say("finish", interleaved)
+            self._until("done")
+        assert self._ended is not None
+        return self._ended
+
+    def close(self) -> None:
+        self._line.close()
+
+    def _until(self, wanted: str) -> Outcome | None:
+        """Listen until it says so, or until it has ended: then its outcome."""
+        kind = ""
+        try:
+            while kind != wanted and self._ended is None:
+                kind, what = self._line.hear()
+                self._take(kind, what)
+        except Killed as limit:
+            self._ended = self._died(limit.status, limit.reason)
+        except EOFError:
+            ending = self._line.process.ending()
+            self._ended = self._died(ending.status, ending.reason)
+        if self._ended is not None:
+            self._line.close()  # now all of its stderr has come
+            row = self._ended.row | {"stderr": self._line.process.stderr or None}
+            self._ended = replace(self._ended, row=row)
+        return self._ended
+
+    def _take(self, kind: str, what: Any) -> None:
+        if kind == "environment":
+            self._environment = what
+        elif kind == "known":
+            self._phase, self._row = what
+        elif kind == "ready":
+            self.long = what
+        elif kind == "turned":
+            self._more = what
+        elif kind == "refused":
+            self._ended = refused(self._row, what)
+        elif kind == "done":
+            self._ended, found = what
+            self.found.update(found)
+
+    def _died(self, status: str, reason: str) -> Outcome:
+        """What was known when it died is kept."""
+        error = self._row["gradient_error"]
+        known = "" if error is None else f"; its gradient was known by then, its error {error:.2g}"
+        row = self._row | {
+            "status": status,
+            "reason": f"{self._row['route']}: {status} while {self._phase}: {reason}{known}",
+        }
+        return Outcome(row, environment=self._environment)
+
+
+def whole(job: Measure, limits: Limits, cwd: str | None = None) -> Outcome:
+    """A case from its start to its end, timed beside no other."""
+    case = Isolated(job, limits, cwd)
+    try:
+        return case.prepared() or alone(case)
+    finally:
+        case.close()

@@ -1,0 +1,1 @@
+"""Processes that can be stopped: groups of their own, with limits, watched from outside."""
