@@ -79,7 +79,7 @@ class Measurement:
         options = route.expect(model, p, **spec.options)
         reason = bench.predict(len(p), route, options, row)
         if reason is None:
-            report("settling its options", row)
+            report("the choice of its options", row)
             resolve_s, options = seconds_of(
                 lambda: route.resolve(model, p, lambda o: bench.predict(len(p), route, o, {}) is None, **spec.options)
             )
@@ -88,18 +88,18 @@ class Measurement:
         _note_whole(bench, route, options, row)
         if reason is not None:
             return _skipped(row, reason)
-        report("preparing", row)
+        report("preparation", row)
         prepare_s, gradient = seconds_of(lambda: route.prepare(model, p, **options))
         row["prepare_s"] = (row["prepare_s"] or 0.0) + bench.build_s + resolve_s + prepare_s
         report("its first call", row)
         row["first_s"], result = seconds_of(lambda: gradient(p))
         _check(bench, route, result, row)
-        report("being judged", row)
+        report("judgement", row)
         _judge(bench, route, row, np.asarray(result.gradient))
-        report("having its work counted and its memory read", row)
+        report("the counting of its work", row)
         _weigh(bench, route, options, lambda: gradient(p), model, row)
         rounds = Rounds(lambda: gradient(p), bench.forward(), row["first_s"], bench.settings.min_time)
-        report("being timed", row)
+        report("timing", row)
         return cls(bench, row, result, rounds if bench.settings.timed else None, route)
 
     @property

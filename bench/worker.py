@@ -58,7 +58,7 @@ class Measure:
 
         channel.say("environment", environment())
         row = self.row | {"prepare_s": age()}
-        channel.say("known", ("building the problem", row))
+        channel.say("known", ("the building of its problem", row))
         try:
             bench = Workbench(self.problem, self.settings, self.found)
         except (InputError, DomainError) as error:

@@ -72,7 +72,7 @@ class Isolated:
         self.found: Found = job.found
         self.long = False
         self._row: Row = job.row
-        self._phase = "starting"
+        self._phase = "its start"
         self._environment: Environment | None = None
         self._ended: Outcome | None = None
         self._line = Line(job, limits, cwd)
@@ -135,7 +135,7 @@ class Isolated:
         known = "" if error is None else f"; its gradient was known by then, its error {error:.2g}"
         row = self._row | {
             "status": status,
-            "reason": f"{self._row['route']}: {status} while {self._phase}: {reason}{known}",
+            "reason": f"{self._row['route']}: {status} in {self._phase}: {reason}{known}",
         }
         return Outcome(row, environment=self._environment)
 
