@@ -15,6 +15,7 @@ from bench.commands.check import check
 from bench.commands.kink import kink
 from bench.commands.run import run, show
 from bench.commands.shared import complain, debug_option, debugging, store_option
+from bench.commands.status import status
 from bench.commands.tolerance import tolerance
 from bench.commands.unrolling import unrolling
 from bench.commands.vcurve import vcurve
@@ -89,6 +90,7 @@ def main() -> None:
 
 
 main.add_command(run)
+main.add_command(status)
 main.add_command(vcurve)
 main.add_command(check)
 main.add_command(kink)

@@ -82,8 +82,12 @@ class Entry:
 def registered(kind: Kind) -> list[Entry]:
     """All entries of a kind, built-ins first."""
     found = [Entry(kind, point) for point in entry_points(group=f"gradient_routes.{kind}s")]
-    order = {name: i for i, name in enumerate(ORDER)}
-    return sorted(found, key=lambda e: (e.origin != BUILT_IN, order.get(e.name, len(order)), e.name))
+    return sorted(found, key=lambda e: (e.origin != BUILT_IN, *place(e.name)))
+
+
+def place(name: str) -> tuple[int, str]:
+    """A key to sort names by: the story's, then the others'."""
+    return ORDER.index(name) if name in ORDER else len(ORDER), name
 
 
 @cache

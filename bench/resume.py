@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Literal
 
 from bench.rows import Row
@@ -35,8 +35,3 @@ def still_open(store: Store, states: tuple[State, ...], expected: Callable[[Row]
         return state_of(row, store.latest(row["case_key"]).get(row["case_key"]), expected) in states
 
     return wanted
-
-
-def count_of(states: Mapping[State, int]) -> str:
-    """In words."""
-    return ", ".join(f"{number} {state}" for state, number in states.items() if number)

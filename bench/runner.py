@@ -73,9 +73,11 @@ class Sweep:
         how: How,
         wanted: Callable[[Row], bool],
     ) -> None:
-        self.problems, self.routes, self.settings, self.how, self.wanted = problems, routes, settings, how, wanted
+        self.routes, self.settings, self.how, self.wanted = routes, settings, how, wanted
+        self.problems = [p for p in problems if any(wanted(self._row(p, route)) for route in routes)]
         guarded = how.limits if how.isolate else None
-        self.sizes: list[Size | None] = [None] if len(problems) == 1 else sizes(problems, settings, guarded)
+        alone = len(self.problems) == 1
+        self.sizes: list[Size | None] = [None] if alone else sizes(self.problems, settings, guarded)
         self.pruning = Pruning()
         self._started: dict[str, tuple[int, Measure, Size | None]] = {}
 

@@ -10,7 +10,7 @@ import json
 import os
 import sqlite3
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -59,15 +59,20 @@ class Store:
 
     def append(self, row: Row, samples: Samples | None, measured_in: Environment | None = None) -> None:
         """Keep a row and its raw timings, all or nothing, and the environment of its process, this one's if None."""
+        self.append_all([(row, samples, measured_in)])
+
+    def append_all(self, cases: Iterable[tuple[Row, Samples | None, Environment | None]]) -> None:
+        """Many at once, all or nothing: the disk is waited for once, which is what a row costs."""
+        names = ", ".join(["environment_id", *(c.name for c in STORED)])
+        marks = ", ".join("?" * (1 + len(STORED)))
         with self._transaction() as db:
-            names = ", ".join(["environment_id", *(c.name for c in STORED)])
-            marks = ", ".join("?" * (1 + len(STORED)))
-            values = (self._environment_id(db, measured_in), *as_record(row))
-            case_id = db.execute(f"INSERT INTO cases ({names}) VALUES ({marks})", values).lastrowid
-            if samples is not None:
-                kinds = (("gradient", samples.gradient), ("forward", samples.forward))
-                timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
-                db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
+            for row, samples, measured_in in cases:
+                values = (self._environment_id(db, measured_in), *as_record(row))
+                case_id = db.execute(f"INSERT INTO cases ({names}) VALUES ({marks})", values).lastrowid
+                if samples is not None:
+                    kinds = (("gradient", samples.gradient), ("forward", samples.forward))
+                    timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
+                    db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
 
     def append_study(self, tables: Mapping[str, Sequence[Row]], started: str) -> int:
         """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""

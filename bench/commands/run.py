@@ -133,7 +133,7 @@ def run(
         for line in said:
             click.echo(line, err=as_json)
     if resume or only:
-        complain(f"{len(done.outcomes)} of {count} cases were run, the others are done")
+        complain(f"{len(done.outcomes)} of {count} cases run, the others left as they are")
     if done.lost:
         failed.append(f"{len(done.lost)} of {len(done.outcomes)} rows were not kept: {done.lost[0]}")
     if failed:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
+from functools import cache
 
 from bench.executors.running import interleaved
 from bench.measurement import Measurement, measure
@@ -44,6 +46,7 @@ class Here:
 def outcomes(jobs: list[Measure]) -> Iterator[Outcome]:
     """Of all routes on one problem."""
     first = jobs[0]
+    settle()
     try:
         bench = Workbench(first.problem, first.settings, first.found)
     except (InputError, DomainError) as error:
@@ -52,3 +55,10 @@ def outcomes(jobs: list[Measure]) -> Iterator[Outcome]:
         yield from (unbuilt(job.row, job.problem.name, failure) for job in jobs)
     else:
         yield from interleaved(Here(bench, job) for job in jobs)
+
+
+@cache
+def settle() -> None:
+    """What is loaded by now stays: the collections before measurements look at what comes after, and are short."""
+    gc.collect()
+    gc.freeze()
