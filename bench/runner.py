@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -79,6 +80,7 @@ class Sweep:
         alone = len(self.problems) == 1
         self.sizes: list[Size | None] = [None] if alone else sizes(self.problems, settings, guarded)
         self.pruning = Pruning()
+        self._places = itertools.count()
         self._started: dict[str, tuple[int, Measure, Size | None]] = {}
 
     def outcomes(self) -> Iterator[Outcome]:
@@ -92,7 +94,7 @@ class Sweep:
 
     def _outcomes(self) -> Iterator[Outcome]:
         for outcome in self._side_by_side() if self.how.jobs > 1 or self.how.cluster else self._one_by_one():
-            place, job, size = self._started[outcome.row["case_key"]]
+            place, job, size = self._started.pop(outcome.row["case_key"])
             self.pruning.note(job.problem, job.route, size, outcome.row)
             yield replace(outcome, place=place)
 
@@ -135,7 +137,7 @@ class Sweep:
                 job = Measure(problem, route, self.settings, self._row(problem, route), found)
                 if not self.wanted(job.row):
                     continue
-                self._started[job.row["case_key"]] = len(self._started), job, size
+                self._started[job.row["case_key"]] = next(self._places), job, size
                 reason = self.pruning.reason(problem, route, size)
                 if reason is None:
                     yield job

@@ -75,7 +75,7 @@ class Isolated:
         self._phase = "its start"
         self._environment: Environment | None = None
         self._ended: Outcome | None = None
-        self._line = Line(job, limits, cwd)
+        self._line = Line(replace(job, found=dict(job.found)), limits, cwd)
 
     def prepared(self) -> Outcome | None:
         return self._until("ready")
