@@ -42,7 +42,7 @@ class Pruning:
             alike = hit.problem.name == problem.name and fixed(hit.problem.options) == fixed(problem.options)
             same = (hit.route.name, hit.route.options) == (route.name, route.options)
             if alike and same and size != hit.size and size[0] >= hit.size[0] and size[1] >= hit.size[1]:
-                where = f"{hit.size[0]} unknowns and {hit.size[1]} parameters"
+                where = f"n_u = {hit.size[0]}, n_p = {hit.size[1]}"
                 return f"{route.name}: {hit.row['status']} at {where} already - {todo(hit.row)}"
         return None
 
@@ -59,6 +59,6 @@ def fixed(options: dict[str, Any]) -> dict[str, Any]:
 def todo(row: Row) -> str:
     """Which limit to raise."""
     if row["status"] == "timeout":
-        return f"raise --timeout {row['timeout_s']:g}"
+        return f"give more than --timeout {row['timeout_s']:g}"
     cap = row["memory_cap_bytes"]
-    return "take a machine of more memory" if cap is None else f"raise --memory {size(cap)}"
+    return "take a machine of more memory" if cap is None else f"give more than --memory {size(cap)}"

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, Protocol
 
 from bench.isolation.inside import submit_to
+from bench.isolation.stack import told
 
 if TYPE_CHECKING:
     from bench.accuracy import Found
@@ -97,6 +98,7 @@ def age() -> float:
 def main(descriptor: int) -> None:
     """Submit to limits, do one job."""
     os.set_inheritable(descriptor, False)  # what a case starts must not hold the line open
+    told()
     os.dup2(2, 1)  # stdout belongs to results, whoever writes to it
     connection = Connection(descriptor)
     limits, parent, sys.path[:] = connection.recv()

@@ -16,6 +16,7 @@ from bench.environment import Environment
 from bench.executors.running import alone
 from bench.isolation.limits import Limits
 from bench.isolation.process import Confined, Killed
+from bench.isolation.stack import where
 from bench.outcome import Outcome, refused
 from bench.rows import Row
 from bench.worker import Job, Measure
@@ -132,10 +133,11 @@ class Isolated:
     def _died(self, status: str, reason: str) -> Outcome:
         """What was known when it died is kept."""
         error = self._row["gradient_error"]
+        at = where(self._line.process.stderr)
         known = "" if error is None else f"; its gradient was known by then, its error {error:.2g}"
         row = self._row | {
             "status": status,
-            "reason": f"{self._row['route']}: {status} in {self._phase}: {reason}{known}",
+            "reason": f"{self._row['route']}: {status} in {self._phase}{at}: {reason}{known}",
         }
         return Outcome(row, environment=self._environment)
 

@@ -16,11 +16,13 @@ from typing import IO, Any
 import psutil
 
 from bench.isolation.limits import Limits
+from bench.isolation.stack import ASKED
 from bench.units import size
 
 TICK = 0.1  # [s] between two looks at its memory
-KEPT = 4000  # characters of stderr
-LAST = 20  # lines of it
+KEPT = 20_000  # bytes of stderr
+LAST = 60  # lines of it
+WRITES = 0.2  # [s] it is given to write its stack
 EXHAUSTED = ("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory")
 
 
@@ -73,8 +75,16 @@ class Confined:
                 self.kill()
                 raise Killed("out-of-memory", f"{size(taken)} > {size(self.limits.memory)} of --memory")
             if time.monotonic() >= deadline:
+                self._ask_where()
                 self.kill()
                 raise Killed("timeout", f"after {self.limits.timeout:g} s of --timeout")
+
+    def _ask_where(self) -> None:
+        """It has a moment to write its stack."""
+        if ASKED is not None and not self._talkative:
+            with suppress(OSError):
+                self.process.send_signal(ASKED)
+            time.sleep(WRITES)
 
     def ended(self, seconds: float) -> bool:
         """Whether it has, within so many seconds."""

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from bench import registry
 from bench.bill import LEGEND, summary
+from bench.isolation.stack import without
 from bench.options import options_of
 from bench.outcome import View
 from bench.rows import ANSWERED, Row
@@ -137,8 +138,9 @@ def remarks(rows: Sequence[Row]) -> list[Text]:
             route = "" if row["reason"].startswith(row["route"]) else f"{row['route']}: "
             line = f"{row['status']}: {where}{route}{row['reason']}"
             lines.setdefault(line, Text(line, style="dim" if row["status"] in ANSWERED else "red"))
-            if row["status"] in LAST_WORDS and row["stderr"]:
-                last = "\n".join(f"  | {said}" for said in row["stderr"].splitlines()[-3:])
+            said = without(row["stderr"] or "").splitlines()[-3:]
+            if row["status"] in LAST_WORDS and said:
+                last = "\n".join(f"  | {each}" for each in said)
                 lines.setdefault(f"{line}\n{last}", Text(last, style="dim"))
     for row in rows:
         for note in filter(None, (row["note"] or "").split("; ")):
