@@ -12,10 +12,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.errors import InputError
+from problems.errors import InputError, check_applies
 from problems.inherited import inherited
+from problems.observation import Observation, selection
 from problems.problem import Array, Fields, Linearization, Offers, Operator, Parameters, ParameterView, Problem, Traced
-from problems.regularization import tikhonov_between, tikhonov_between_gradient
+from problems.regularization import WIDTH as JUMP
+from problems.regularization import FieldPhi, Prior
 from problems.supg import Supg, direction, inflow
 
 TARGET = 0.5  # temperature wanted where the flow is observed [K]
@@ -67,12 +69,15 @@ class Advection(Problem):
         data: Annotated[Literal["target", "twin"], "0.5 K; twin: of an inclusion, or of the plume"] = "target",
         noise: Annotated[float, "standard deviation added to a twin's data [K]"] = 0.0,
         seed: Annotated[int, "of that noise"] = 0,
-        alpha: Annotated[float, "weight of Phi = 1/2 |D log kappa|^2 or 1/2 |D f|^2, D between neighbours"] = 0.0,
+        alpha: Annotated[float, "weight of Phi"] = 0.0,
+        phi: Annotated[FieldPhi, "of theta = log kappa or f: 1/2 |D theta|^2 or total variation"] = "tikhonov",
+        phi_width: Annotated[float, "jump of theta below which total variation is rounded"] = JUMP,
     ) -> None:
-        _check(n, angle, kappa, unknown, parametrization, data, noise, seed, alpha)
+        _check(n, angle, kappa, unknown, parametrization, data, noise, seed)
+        check_applies("advection", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != JUMP}))
         self._on_mesh = partial(
             Advection, angle=angle, kappa=kappa, unknown=unknown, parametrization=parametrization, sensors=sensors,
-            data=data, noise=noise, seed=seed, alpha=alpha,
+            data=data, noise=noise, seed=seed, alpha=alpha, phi=phi, phi_width=phi_width,
         )  # fmt: skip
         self.n, self.noise, self.seed, self.alpha = n, noise, seed, alpha
         self.of_source, self.log = unknown == "source", unknown == "diffusivity" and parametrization != "raw"
@@ -84,11 +89,13 @@ class Advection(Problem):
         self.seen = np.flatnonzero(inflow(self.supg.x, -b)) if self.on_outflow else np.arange(self.n_state)
         self.d: Array | None = np.full(len(self.seen), TARGET) if data == "target" else None
         self._fields_at(self.supg.centres, b, kappa, blank=data == "twin")
+        self.regularization = Prior(alpha, phi, phi_width, self.supg.neighbours)
+        self.regularization.check("advection")
 
     def _fields_at(self, x: Array, b: Array, kappa: float, blank: bool) -> None:
         """What is known, and the parameters: where they start, and what made a twin's data."""
         ones = np.ones(len(x))
-        self.kappa, self.f, self.neighbours = kappa * ones, plume(x, b), self.supg.neighbours
+        self.kappa, self.f = kappa * ones, plume(x, b)
         if self.of_source:
             start, truth, bounds, unit, name = ones if blank else self.f, self.f, (-np.inf, np.inf), "K/s", "f"
         else:
@@ -128,10 +135,7 @@ class Advection(Problem):
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = w/2 |u - d|^2 + alpha Phi [K2 m, K2 m2 where all is seen]."""
         J = 0.5 * self.w * xp.sum((u[self.seen] - self._data()) ** 2)
-        return J + self.alpha * self._phi(p, xp) if self.alpha else J
-
-    def _phi(self, p: Any, xp: Any = np) -> Any:
-        return tikhonov_between(xp, self._theta(p, xp), self.neighbours)
+        return J + self.regularization.value(xp, self._theta(p, xp)) if self.alpha else J
 
     def _theta(self, p: Any, xp: Any = np) -> Any:
         return p if self.log or self.of_source else xp.log(p)
@@ -141,7 +145,7 @@ class Advection(Problem):
         by_cell = self.supg.by_f(kappa) if self.of_source else self.supg.by_kappa(u, kappa, f)
         J_p = np.zeros_like(p)
         if self.alpha:
-            by_theta = self.alpha * tikhonov_between_gradient(self._theta(p), self.neighbours)
+            by_theta = self.regularization.gradient(self._theta(p))
             J_p = by_theta if self.log or self.of_source else by_theta / p
         return Linearization(self._by_p(by_cell, kappa), self.w * self._misfit(u), J_p)
 
@@ -155,6 +159,14 @@ class Advection(Problem):
         misfit[self.seen] = u[self.seen] - self._data()
         return misfit
 
+    def observation(self, u: Array, p: Array) -> Observation:
+        root = math.sqrt(self.w)
+        S_u = selection(self.seen, self.n_state, root)
+        return Observation(root * u[self.seen], root * self._data(), S_u, sigma=root * self.noise)
+
+    def prior(self, p: Array) -> tuple[Prior, Array, Array]:
+        return self.regularization, self._theta(p), np.ones_like(p) if self.log or self.of_source else 1.0 / p
+
     def traced(self) -> Traced:
         from problems.jax64 import jnp
 
@@ -166,7 +178,7 @@ class Advection(Problem):
         """1/2 int (u - d)^2 + alpha Phi with the consistent mass matrix; u - d is 0 at the inflow, as in J."""
         misfit = self._misfit(u)
         by_u = self.supg.mass(self.on_outflow) @ misfit
-        return float(0.5 * misfit @ by_u + self.alpha * self._phi(p)), by_u
+        return float(0.5 * misfit @ by_u + self.regularization.value(np, self._theta(p))), by_u
 
     def continuous_adjoint(self, u: Array, p: Array) -> tuple[Any, Operator]:
         """-b . grad lam - div(kappa grad lam) = -J_u, kappa dlam/dn + b . n lam = 0 at the outflow, 0 at the inflow.
@@ -226,7 +238,6 @@ class Advection(Problem):
 
 def _check(
     n: int, angle: float, kappa: float, unknown: str, parametrization: str | None, data: str, noise: float, seed: int,
-    alpha: float,
 ) -> None:  # fmt: skip
     if not 1 <= n <= N_MAX:
         raise InputError(f"advection: n={n} cells along an edge - choose n >= 1 and <= {N_MAX}")
@@ -240,5 +251,3 @@ def _check(
         raise InputError(f"advection: noise={noise:g} - choose noise >= 0, for synthetic data (data=twin) only")
     if seed < 0:
         raise InputError(f"advection: seed={seed} - choose seed >= 0")
-    if not 0 <= alpha < math.inf:
-        raise InputError(f"advection: alpha={alpha:g} - a weight is finite and >= 0")

@@ -15,9 +15,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from problems.chain import Bordered, Chain, ElementForces, cumulative_sum, difference, divergence
-from problems.errors import InputError
+from problems.errors import InputError, check_applies
+from problems.observation import Observation, selection
 from problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Reference, Traced
-from problems.regularization import tikhonov, tikhonov_gradient
+from problems.regularization import WIDTH as JUMP
+from problems.regularization import FieldPhi, Prior
 from problems.sensors import Nodes, Sensors, measured, parse_nodes
 from problems.stop import GAP, K_C, WIDTH, Stop, StopName, stop_of
 
@@ -59,7 +61,9 @@ class Bar(Problem):
         data: Annotated[str | None, "CSV file of measurements, columns node,displacement [synthetic]"] = None,
         noise: Annotated[float, "standard deviation added to synthetic data [m]"] = 0.0,
         seed: Annotated[int, "of that noise"] = 0,
-        alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
+        alpha: Annotated[float, "weight of Phi"] = 0.0,
+        phi: Annotated[FieldPhi, "1/2 |D log E|^2, D between neighbours, or total variation of log E"] = "tikhonov",
+        phi_width: Annotated[float, "jump of log E below which total variation is rounded"] = JUMP,
         stop: Annotated[StopName, "beyond the tip; multiplier: rigid, the others yield by k_c"] = "none",
         gap: Annotated[float, "that the tip may move before it meets the stop [m]"] = GAP,
         k_c: Annotated[float, "stiffness of a stop that yields [N/m]"] = K_C,
@@ -67,8 +71,9 @@ class Bar(Problem):
     ) -> None:
         if not 1 <= n <= N_MAX:
             raise InputError(f"bar: n={n} elements - choose n >= 1 and <= {N_MAX}")
-        if not (alpha >= 0 and math.isfinite(alpha)):
-            raise InputError(f"bar: alpha={alpha:g} - a weight is finite and >= 0")
+        check_applies("bar", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != JUMP}))
+        self.regularization = Prior(alpha, phi, phi_width)
+        self.regularization.check("bar")
         if not (noise >= 0 and math.isfinite(noise)):
             raise InputError(f"bar: noise={noise:g} - a standard deviation is finite and >= 0")
         if seed < 0:
@@ -83,7 +88,7 @@ class Bar(Problem):
         self.f = np.zeros(n)  # [N]
         self.f[-1] = F
         self.x = (np.arange(n) + 0.5) * self.L_e  # element centres [m]
-        self.synthetic = data is None
+        self.synthetic, self.noise = data is None, noise
         if data is not None:
             self.sensors = measured(data, n, sensors, "bar")
         else:
@@ -125,6 +130,7 @@ class Bar(Problem):
         if 2 * self.n > N_MAX:
             return None
         finer = Bar(n=2 * self.n, sensors=0, parametrization="log" if self.log else "raw", alpha=self.alpha)
+        finer.regularization = self.regularization
         finer.sensors, finer.synthetic = Sensors(2 * self.sensors.nodes, self.sensors.d), self.synthetic
         finer._meet(self.stop)
         finer._look()
@@ -179,15 +185,15 @@ class Bar(Problem):
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 |S u - d|^2 + alpha Phi [m^2]."""
         J = self.sensors.misfit(xp, u)
-        return J + self.alpha * tikhonov(xp, self.log_modulus(p, xp)) if self.alpha else J
+        return J + self.regularization.value(xp, self.log_modulus(p, xp)) if self.alpha else J
 
     def linearize(self, u: Array, p: Array) -> Linearization:
         """R_p = B^T diag(dD/dp B u), J_u = S^T (S u - d), J_p = alpha Phi'."""
         dD_dp = self.stiffness(p) if self.log else np.full_like(p, A / self.L_e)
         J_p = np.zeros_like(p)
         if self.alpha:
-            dPhi = tikhonov_gradient(self.log_modulus(p))
-            J_p = self.alpha * (dPhi if self.log else dPhi / p)
+            by_theta = self.regularization.gradient(self.log_modulus(p))
+            J_p = by_theta if self.log else by_theta / p
         R_p = ElementForces(dD_dp * difference(u[: self.n]), zero_rows=self.n_state - self.n)
         return Linearization(R_p, self.sensors.misfit_gradient(u), J_p)
 
@@ -200,7 +206,14 @@ class Bar(Problem):
         if integral is None:
             return None
         value, by_u = integral
-        return float(value + self.alpha * tikhonov(np, self.log_modulus(p))), by_u
+        return float(value + self.regularization.value(np, self.log_modulus(p))), by_u
+
+    def observation(self, u: Array, p: Array) -> Observation:
+        at, d, nodes = self.sensors.nodes - 1, self.sensors.d, self.sensors.nodes
+        return Observation(u[at], d, selection(at, self.n_state), sigma=self.noise, label=lambda k: f"u_{nodes[k]}")
+
+    def prior(self, p: Array) -> tuple[Prior, Array, Array]:
+        return self.regularization, self.log_modulus(p), np.ones_like(p) if self.log else 1.0 / p
 
     def traced(self) -> Traced:
         from problems.jax64 import jnp
@@ -242,12 +255,10 @@ class Bar(Problem):
         r, size = np.zeros((2, self.n), np.longdouble)
         r[at], size[at] = T * S[at] - d, abs(T * S[at]) + abs(d)
         seen_r, seen_size = np.cumsum(r[::-1])[::-1], np.cumsum(size[::-1])[::-1]
-        theta = np.log(E)
-        jumps = np.diff(theta)
-        dPhi = np.concatenate([[0.0], jumps]) - np.concatenate([jumps, [0.0]])
-        dJ_dtheta = -s * (T * seen_r + dT_dC * (r @ S)) + self.alpha * dPhi
+        by_prior = self.regularization.gradient(np.log(E))
+        dJ_dtheta = -s * (T * seen_r + dT_dC * (r @ S)) + by_prior
         chain_rule = 1.0 if self.log else 1.0 / E
-        terms = (s * (abs(T) * seen_size + abs(dT_dC) * (size @ S)) + self.alpha * abs(dPhi)) * chain_rule
+        terms = (s * (abs(T) * seen_size + abs(dT_dC) * (size @ S)) + abs(by_prior)) * chain_rule
         return Reference("closed form", np.asarray(dJ_dtheta * chain_rule, float), float(np.sqrt(np.sum(terms**2))))
 
     def truth(self) -> Array | None:

@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -15,7 +16,10 @@ from problems.elements import ElementName
 from problems.errors import InputError, check_applies
 from problems.inherited import inherited
 from problems.mechanics import Load, Mechanics
+from problems.observation import Observation
 from problems.problem import Array, Fields, Linearization, Offers, Operator, ParameterView, Problem, Traced
+from problems.regularization import WIDTH as JUMP
+from problems.regularization import Phi, Prior
 from problems.supports import Supports, check_clamp
 from problems.unknowns import Setting, Unknown, UnknownName
 
@@ -25,6 +29,7 @@ ACROSS = 0.25  # of the traction: pushed sideways a block bends, and far
 TARGET = 0.2  # of the body's height: how far the top should go, where nobody has measured
 MOST = 10**7  # cells, markers, layers: more fit in no memory
 NEARLY_INCOMPRESSIBLE = 0.495
+FIELDS: tuple[UnknownName, ...] = ("modulus", "layers")
 MATERIAL: tuple[UnknownName, ...] = ("modulus", "layers", "constants")
 
 
@@ -69,6 +74,9 @@ class Block(Problem):
         data: Annotated[str | None, "CSV file x,y,z,ux,uy,uz; twin: made by a stiff inclusion [the target]"] = None,
         noise: Annotated[float, "standard deviation added to a twin's data [m]"] = 0.0,
         seed: Annotated[int, "of noise and markers"] = 0,
+        alpha: Annotated[float, "weight of Phi"] = 0.0,
+        phi: Annotated[Phi | None, "1/2 |D log E|^2 or total variation; amplitude: 1/2 |p - p_0|^2"] = None,
+        phi_width: Annotated[float, "jump of log E below which total variation is rounded"] = JUMP,
     ) -> None:
         self._given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         _check_counts(n=n, nx=nx, ny=ny, nz=nz, layers=layers, cases=cases, markers=markers, seed=seed)
@@ -83,6 +91,8 @@ class Block(Problem):
             ("unknown=shape", unknown == "shape", True, {"surface": surface != "right"}),
             ("load=displacement", load == "displacement", True, {"displacement": displacement != 0.2}),
             ("load=displacement", load == "displacement", False, {"traction": traction != 0.2}),
+            ("phi=tv", phi == "tv", True, {"phi_width": phi_width != JUMP}),
+            ("unknown=modulus or layers", unknown in FIELDS, True, {"phi": phi in ("tikhonov", "tv")}),
         )
         _check_numbers(nu, traction, displacement, noise, data)
         _check_unknown(unknown, load, cases, parametrization, derivatives)
@@ -121,6 +131,7 @@ class Block(Problem):
         supports = Supports.of(body, clamp, grip, directions)
         self.mechanics = Mechanics(body, chosen, supports, top, load, directions, choices[unknown](), at_rest, by_hand)
         self.parameters = self.mechanics.unknown.parameters
+        self.alpha, self.regularization = alpha, self._prior(alpha, phi, phi_width, unknown)
         self.n_state = supports.n_u
         self.linear = law == "linear" and load != "follower"
         self.structure = "spd" if self.mechanics.symmetric else "general"
@@ -162,6 +173,17 @@ class Block(Problem):
         target = height[None, :, None] * directions[:, None]
         self.d = None if self.twin_data else target
 
+    def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: UnknownName) -> Prior:
+        """Neighbours are cells with a facet in common, and layers one above the other."""
+        kind = phi or ("tikhonov" if unknown in FIELDS else "amplitude")
+        f2t = self.body.mesh.f2t
+        pairs = np.asarray(f2t.T[f2t[1] >= 0]) if unknown == "modulus" else None
+        prior = Prior(alpha, kind, width, pairs, self.parameters.start, self.parameters.scale)
+        if kind == "amplitude" and unknown in FIELDS:
+            prior = replace(prior, origin=self._theta(self.parameters.start), scale=1.0)
+        prior.check("block")
+        return prior
+
     # --- the contract
 
     def initial(self, p: Array) -> Array:
@@ -177,9 +199,59 @@ class Block(Problem):
         return self.mechanics.tangent_operator(u, p)
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
-        """J = 1/2 sum over load cases of |S u - d|^2 [m^2]."""
+        """J = 1/2 sum over load cases of |S u - d|^2, and alpha Phi [m^2]."""
         d, U = self._data(), self._seen(u, self.mechanics.setting(p, xp), xp)
-        return sum(self.probes.misfit(U[case], d[case]) for case in range(len(d)))
+        J = sum(self.probes.misfit(U[case], d[case]) for case in range(len(d)))
+        return J + self.regularization.value(xp, self._theta(p, xp)) if self.alpha else J
+
+    def _theta(self, p: Any, xp: Any = np) -> Any:
+        """What is regularized: log E of moduli, p itself of others."""
+        return p if self.log or self.mechanics.unknown.group is None else xp.log(p)
+
+    def observation(self, u: Array, p: Array) -> Observation:
+        d, U = self._data(), self._seen(u, self.mechanics.setting(p))
+        seen, cases = self.probes.seen, range(len(d))
+        predicted = np.concatenate([self.probes.read(U[case])[seen] for case in cases])
+        S_u, by_grip = self._sampling
+        return Observation(
+            predicted,
+            np.concatenate([d[case][seen] for case in cases]),
+            S_u,
+            by_grip if self._moves_grip else None,
+            self.noise,
+            self._datum,
+        )
+
+    @property
+    def _moves_grip(self) -> bool:
+        return self.mechanics.load == "displacement" and self.mechanics.unknown.is_load
+
+    @cached_property
+    def _sampling(self) -> tuple[Any, Array]:
+        """What is read, datum by datum: by u (m, n_u), sparse, and by the amplitude of a grip (m, 1)."""
+        from scipy import sparse
+
+        supports, probes, cases = self.mechanics.supports, self.probes, len(self.mechanics.directions)
+        points, components = np.nonzero(probes.seen)
+        N, blocks, grips = probes.N[points], [], []
+        for case in range(cases):
+            at = supports.index[case][probes.nodes[points], components[:, None]]  # (m, k)
+            rows = np.broadcast_to(np.arange(len(points))[:, None], at.shape)
+            entries = (N.ravel(), (rows.ravel(), at.ravel()))
+            S = sparse.csr_array(entries, shape=(len(points), supports.n_free + 2))
+            blocks.append(S[:, : supports.n_free])
+            grips.append(S[:, [supports.n_free + 1]].toarray())
+        return sparse.block_diag(blocks, format="csr"), np.concatenate(grips)
+
+    def _datum(self, k: int) -> str:
+        points, components = np.nonzero(self.probes.seen)
+        case, k = divmod(k, len(points))
+        which = f", case {case + 1}" if len(self.mechanics.directions) > 1 else ""
+        return f"u_{'xyz'[components[k]]} at ({', '.join(f'{x:.3g}' for x in self.probes.x[points[k]])}){which}"
+
+    def prior(self, p: Array) -> tuple[Prior, Array, Array]:
+        theta = self._theta(p)
+        return self.regularization, theta, np.ones_like(p) if theta is p else 1.0 / p
 
     def _seen(self, u: Any, s: Setting, xp: Any = np) -> list[Any]:
         """Displacements of the nodes the probes read, (m, k, 3) each load case."""
@@ -197,8 +269,10 @@ class Block(Problem):
         d, U = self._data(), self._seen(u, self.mechanics.setting(p))
         forces = [self.probes.misfit_gradient(U[case], d[case]) for case in range(len(d))]
         pairs = [self.mechanics.supports.gather(f, self.probes.nodes, case) for case, f in enumerate(forces)]
-        moves_grip = self.mechanics.load == "displacement" and self.mechanics.unknown.is_load
-        J_p = np.full_like(p, sum(by_grip for _, by_grip in pairs) if moves_grip else 0.0)
+        J_p = np.full_like(p, sum(by_grip for _, by_grip in pairs) if self._moves_grip else 0.0)
+        if self.alpha:
+            prior, theta, by_p = self.prior(p)
+            J_p = J_p + prior.gradient(theta) * by_p
         return Linearization(self.mechanics.by_p(u, p), np.concatenate([by_u for by_u, _ in pairs]), J_p)
 
     def traced(self) -> Traced:

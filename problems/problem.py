@@ -11,12 +11,16 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from problems.errors import DomainError, InputError, NotOffered
+
+if TYPE_CHECKING:
+    from problems.observation import Observation
+    from problems.regularization import Prior
 
 Array = NDArray[Any]
 Structure = Literal["spd", "symmetric", "general"]
@@ -221,6 +225,14 @@ class Problem:
     def traced(self) -> Traced:
         """R and J for JAX. Import jax inside, through `problems.jax64`."""
         raise NotOffered(f"{self.name}: offers no jax.numpy version of R and J")
+
+    def observation(self, u: Array, p: Array) -> Observation | None:
+        """The data term of J at (u, p), datum by datum; None where J is no sum of squares."""
+        return None
+
+    def prior(self, p: Array) -> tuple[Prior, Array, Array] | None:
+        """What regularizes: the prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where nothing could."""
+        return None
 
     def reference(self, p: Array) -> Reference | None:
         """A gradient known by other means (closed form), or None."""

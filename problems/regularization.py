@@ -1,34 +1,88 @@
-"""Phi(p), the prior. Its weight alpha stands in J and nowhere else."""
+"""alpha Phi(theta), the prior. It stands in J and nowhere else."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from problems.errors import InputError
 from problems.problem import Array
 
-
-def tikhonov(xp: Any, theta: Any) -> Any:
-    """Phi = 1/2 |D theta|^2, D the differences of neighbours on a line; 0 for a single one. xp: numpy or jax.numpy."""
-    return 0.5 * xp.sum((theta[1:] - theta[:-1]) ** 2)
-
-
-def tikhonov_gradient(theta: Array) -> Array:
-    """dPhi/dtheta = D^T D theta, (n,)."""
-    D_theta = np.diff(theta)
-    gradient = np.zeros_like(theta)
-    gradient[1:] += D_theta
-    gradient[:-1] -= D_theta
-    return gradient
+Phi = Literal["tikhonov", "tv", "amplitude"]
+FieldPhi = Literal["tikhonov", "tv"]
+WIDTH = 0.01  # of a jump of log E: 1 %
+Alpha = Annotated[float, "weight of Phi"]
 
 
-def tikhonov_between(xp: Any, theta: Any, pairs: Array) -> Any:
-    """Phi = 1/2 sum over pairs (m, 2) of neighbours of (theta_i - theta_j)^2. xp: numpy or jax.numpy."""
-    return 0.5 * xp.sum((theta[pairs[:, 0]] - theta[pairs[:, 1]]) ** 2)
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """alpha Phi of theta (n,), whose differences D theta are those of neighbours.
 
+    tikhonov   Phi = 1/2 |D theta|^2
+    tv         Phi = sum of sqrt((D theta)_k^2 + width^2) - width, total variation rounded below jumps of `width`
+    amplitude  Phi = 1/2 |theta - origin|^2, in units of `scale`
 
-def tikhonov_between_gradient(theta: Array, pairs: Array) -> Array:
-    """dPhi/dtheta, (n,)."""
-    jumps = theta[pairs[:, 0]] - theta[pairs[:, 1]]
-    return np.bincount(pairs[:, 0], jumps, len(theta)) - np.bincount(pairs[:, 1], jumps, len(theta))
+    pairs (m, 2) numbers of neighbours; None: those on a line.
+    """
+
+    alpha: float = 0.0
+    kind: Phi = "tikhonov"
+    width: float = WIDTH
+    pairs: Array | None = None
+    origin: Array | float = 0.0
+    scale: Array | float = 1.0
+
+    def check(self, who: str) -> None:
+        """Raises InputError."""
+        if not 0.0 <= self.alpha < math.inf:
+            raise InputError(f"{who}: alpha={self.alpha:g} - a weight is finite and >= 0")
+        if not 0.0 < self.width < math.inf:
+            raise InputError(f"{who}: phi_width={self.width:g} - a jump is rounded over a width > 0")
+
+    def jumps(self, theta: Any) -> Any:
+        """D theta, (m,)."""
+        if self.kind == "amplitude":
+            return (theta - self.origin) / self.scale
+        if self.pairs is None:
+            return theta[1:] - theta[:-1]
+        return theta[self.pairs[:, 0]] - theta[self.pairs[:, 1]]
+
+    def value(self, xp: Any, theta: Any) -> Any:
+        """alpha Phi, holomorphic. xp: numpy or jax.numpy."""
+        jumps = self.jumps(theta)
+        if self.kind == "tv":
+            return self.alpha * xp.sum(xp.sqrt(jumps**2 + self.width**2) - self.width)
+        return 0.5 * self.alpha * xp.sum(jumps**2)
+
+    def gradient(self, theta: Array) -> Array:
+        """alpha dPhi/dtheta = alpha D^T diag(weights) D theta, (n,), in the precision of theta where on a line."""
+        flow = self.alpha * self.weights(theta) * self.jumps(theta)
+        if self.kind == "amplitude":
+            return np.asarray(flow / self.scale)
+        gradient = np.zeros_like(theta)
+        if self.pairs is None:
+            gradient[1:] += flow
+            gradient[:-1] -= flow
+            return gradient
+        np.add.at(gradient, self.pairs[:, 0], flow)
+        np.subtract.at(gradient, self.pairs[:, 1], flow)
+        return gradient
+
+    def weights(self, theta: Array) -> Array:
+        """(m,) of D^T diag(weights) D: Phi'' of tikhonov; of tv what it would be with the weights standing still."""
+        jumps = self.jumps(theta)
+        return np.asarray(1.0 / np.sqrt(jumps**2 + self.width**2) if self.kind == "tv" else np.ones_like(jumps))
+
+    def differences(self, n: int) -> Any:
+        """D as a sparse matrix (m, n)."""
+        from scipy import sparse
+
+        if self.kind == "amplitude":
+            return sparse.diags_array(1.0 / np.broadcast_to(self.scale, n)).tocsr()
+        pairs = self.pairs if self.pairs is not None else np.stack([np.arange(1, n), np.arange(n - 1)], axis=1)
+        rows = np.repeat(np.arange(len(pairs)), 2)
+        signs = np.tile([1.0, -1.0], len(pairs))
+        return sparse.csr_array((signs, (rows, pairs.ravel())), shape=(len(pairs), n))
