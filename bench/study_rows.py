@@ -150,6 +150,102 @@ KINK = (
     Column("newton_iterations", "INTEGER", "1", "of the forward solve"),
 )
 
+RUN = (
+    *PROBLEM,
+    Column("route", "TEXT", "", "name of the route that gives gradients"),
+    Column("route_options", "TEXT", "", "its options", json=True),
+    Column("optimizer", "TEXT", "", "lbfgs, gauss-newton, levenberg-marquardt, trust, descent, adam or one-shot"),
+    Column("alpha", "REAL", "1", "weight of Phi in J"),
+    Column("label", "TEXT", "", "selector of problem and route, as a person reads them"),
+)
+INVERSION = (
+    *RUN,
+    Column("iteration", "INTEGER", "1", "accepted steps so far; 0: the start"),
+    Column("objective", "REAL", "problem's", "J"),
+    Column("misfit", "REAL", "problem's", "1/2 |S u - d|^2"),
+    Column("regularization", "REAL", "problem's", "alpha Phi"),
+    Column("gradient_norm", "REAL", "problem's", "|dJ/dp|_2"),
+    Column("step_length", "REAL", "1", "|p_k - p_(k-1)| / |p_k|, scaled by the natural change of each parameter"),
+    Column("forward_solves", "INTEGER", "1", "so far"),
+    Column("adjoint_solves", "INTEGER", "1", "linearized and transposed solves so far, Newton steps left out"),
+    Column("seconds", "REAL", "s", "so far"),
+    Column("distance", "REAL", "1", "|p - p_true| / |p_0 - p_true|, where the truth is known"),
+    Column("says", "TEXT", "", "what happened there: a stall, a step out of the domain, why it stopped"),
+)
+ESTIMATES = (
+    *RUN,
+    Column("parameter", "TEXT", "", "its name"),
+    Column("x", "REAL", "m", "where it lives"),
+    Column("y", "REAL", "m", "where it lives"),
+    Column("z", "REAL", "m", "where it lives"),
+    Column("start", "REAL", "its own", "p_0"),
+    Column("estimate", "REAL", "its own", "p at the end"),
+    Column("truth", "REAL", "its own", "p behind synthetic data"),
+    Column("gradient", "REAL", "problem's", "dJ/dp at the end"),
+    Column("blind", "INTEGER", "1", "1 where no datum depends on it"),
+)
+LCURVE = (
+    *RUN,
+    Column("misfit", "REAL", "problem's", "1/2 |S u - d|^2 at the minimum of J"),
+    Column("phi", "REAL", "1", "Phi there"),
+    Column("curvature", "REAL", "1", "of log Phi over log misfit"),
+    Column("discrepancy", "REAL", "1", "|S u - d| / (sigma sqrt(m)): 1 where the data are met to their noise"),
+    Column("distance", "REAL", "1", "|p - p_true| / |p_0 - p_true|"),
+    Column("iterations", "INTEGER", "1", "of the optimizer"),
+    Column("forward_solves", "INTEGER", "1", "they took"),
+    Column("chosen", "TEXT", "", "corner, discrepancy, or both"),
+)
+TRADEOFF = (
+    *RUN,
+    Column("draws", "INTEGER", "1", "noises drawn"),
+    Column("bias", "REAL", "1", "|mean p - p_true|^2 / n_p, over the draws"),
+    Column("variance", "REAL", "1", "mean |p - mean p|^2 / n_p"),
+    Column("total", "REAL", "1", "their sum: mean |p - p_true|^2 / n_p"),
+)
+EXPERIMENT = (
+    *PROBLEM,
+    Column("experiment", "TEXT", "", "selector of the problem, as a person reads it"),
+)
+SPECTRUM = (
+    *EXPERIMENT,
+    Column("index_", "INTEGER", "1", "k, largest first"),
+    Column("singular_value", "REAL", "problem's", "of H = d(S u)/dp times natural changes of p"),
+    Column("relative_to_noise", "REAL", "1", "singular_value / sigma; NULL where no noise is known"),
+    Column("identifiable", "INTEGER", "1", "1 where above the noise, or above rounding where there is none"),
+)
+IDENTIFIED = (
+    *EXPERIMENT,
+    Column("parameter", "TEXT", "", "its name"),
+    Column("x", "REAL", "m", "where it lives"),
+    Column("y", "REAL", "m", "where it lives"),
+    Column("z", "REAL", "m", "where it lives"),
+    Column("column_norm", "REAL", "problem's", "|H e_i|, of a natural change of it"),
+    Column("kind", "TEXT", "", "seen, weak (below the noise) or blind (exactly zero)"),
+    Column("null_share", "REAL", "1", "|P_0 e_i|^2, P_0 onto the directions that are not identifiable"),
+    Column("posterior_sd", "REAL", "its own", "standard deviation after the data, Gaussian; NULL where unbounded"),
+    Column("prior_sd", "REAL", "its own", "before them; NULL where there is no prior"),
+)
+EXPERIMENTS = (
+    *EXPERIMENT,
+    Column("data", "INTEGER", "1", "m"),
+    Column("sigma", "REAL", "problem's", "of the noise"),
+    Column("rank", "INTEGER", "1", "identifiable directions"),
+    Column("blind", "INTEGER", "1", "parameters no datum depends on"),
+    Column("weak", "INTEGER", "1", "parameters below the noise"),
+    Column("gained", "INTEGER", "1", "rank less that of the first experiment"),
+)
+PLACEMENT = (
+    *EXPERIMENT,
+    Column("criterion", "TEXT", "", "D: log det, A: trace of the posterior covariance"),
+    Column("step", "INTEGER", "1", "sensors chosen so far"),
+    Column("sensor", "TEXT", "", "what is read"),
+    Column("x", "REAL", "m", "where"),
+    Column("y", "REAL", "m", "where"),
+    Column("z", "REAL", "m", "where"),
+    Column("value", "REAL", "1", "of the criterion with it"),
+    Column("rank", "INTEGER", "1", "identifiable directions with it"),
+)
+
 STUDIES: dict[str, tuple[Column, ...]] = {
     "checks": CHECKS,
     "points": POINTS,
@@ -157,4 +253,12 @@ STUDIES: dict[str, tuple[Column, ...]] = {
     "unrolling": UNROLLING,
     "unrolling_fits": UNROLLING_FITS,
     "kink": KINK,
+    "inversion": INVERSION,
+    "estimates": ESTIMATES,
+    "lcurve": LCURVE,
+    "tradeoff": TRADEOFF,
+    "spectrum": SPECTRUM,
+    "identified": IDENTIFIED,
+    "experiments": EXPERIMENTS,
+    "placement": PLACEMENT,
 }
