@@ -165,7 +165,7 @@ INVERSION = (
     Column("misfit", "REAL", "problem's", "1/2 |S u - d|^2"),
     Column("regularization", "REAL", "problem's", "alpha Phi"),
     Column("gradient_norm", "REAL", "problem's", "|dJ/dp|_2"),
-    Column("step_length", "REAL", "1", "|p_k - p_(k-1)| / |p_k|, scaled by the natural change of each parameter"),
+    Column("step_length", "REAL", "1", "|x_k - x_(k-1)|_2, x being p in natural changes"),
     Column("forward_solves", "INTEGER", "1", "so far"),
     Column("adjoint_solves", "INTEGER", "1", "linearized and transposed solves so far, Newton steps left out"),
     Column("seconds", "REAL", "s", "so far"),

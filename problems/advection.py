@@ -56,6 +56,7 @@ class Advection(Problem):
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     linear = True
     structure = "general"
+    regularization: Prior
 
     def __init__(
         self,
@@ -79,7 +80,8 @@ class Advection(Problem):
             Advection, angle=angle, kappa=kappa, unknown=unknown, parametrization=parametrization, sensors=sensors,
             data=data, noise=noise, seed=seed, alpha=alpha, phi=phi, phi_width=phi_width,
         )  # fmt: skip
-        self.n, self.noise, self.seed, self.alpha = n, noise, seed, alpha
+        self.n, self.noise, self.seed = n, noise, seed
+        self.affine = unknown == "source"
         self.of_source, self.log = unknown == "source", unknown == "diffusivity" and parametrization != "raw"
         b = direction(angle)
         self.supg = Supg.of(n, b)

@@ -51,6 +51,7 @@ class Bar(Problem):
     name = "bar"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     linear = True
+    regularization: Prior
 
     def __init__(
         self,
@@ -83,7 +84,6 @@ class Bar(Problem):
         self.n, self.n_state, self.structure = n, n, "spd"
         self._meet(stop_of(stop, gap, k_c, width, "bar"))
         self.log = parametrization == "log"
-        self.alpha = alpha
         self.L_e = L / n
         self.f = np.zeros(n)  # [N]
         self.f[-1] = F

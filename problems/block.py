@@ -43,6 +43,7 @@ class Block(Problem):
     name = "block"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     load_steps = True
+    regularization: Prior
 
     def __init__(
         self,
@@ -131,9 +132,10 @@ class Block(Problem):
         supports = Supports.of(body, clamp, grip, directions)
         self.mechanics = Mechanics(body, chosen, supports, top, load, directions, choices[unknown](), at_rest, by_hand)
         self.parameters = self.mechanics.unknown.parameters
-        self.alpha, self.regularization = alpha, self._prior(alpha, phi, phi_width, unknown)
+        self.regularization = self._prior(alpha, phi, phi_width, unknown)
         self.n_state = supports.n_u
         self.linear = law == "linear" and load != "follower"
+        self.affine = self.linear and unknown in ("traction", "load")
         self.structure = "spd" if self.mechanics.symmetric else "general"
         self.offset = float(np.ptp(body.box, axis=0).max())  # grad u is added to 1, u to nothing larger than the body
         self.matrix_free = not by_hand
