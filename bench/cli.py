@@ -15,6 +15,7 @@ import click
 
 from bench.commands.check import check
 from bench.commands.kink import kink
+from bench.commands.scaling import scaling
 from bench.commands.shared import (
     SELECTOR,
     at_option,
@@ -275,3 +276,4 @@ def report(store: Path) -> None:
 
 main.add_command(tolerance)
 main.add_command(unrolling)
+main.add_command(scaling)
