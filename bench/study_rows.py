@@ -171,6 +171,8 @@ SCALING_FITS = (
     Column("fitted_from", "REAL", "1", "the smallest x of them"),
     Column("fitted_to", "REAL", "1", "the largest"),
     Column("fit_residual", "REAL", "1", "largest relative distance of one of them from the law"),
+    Column("least", "REAL", "quantity's", "the least of it at any size"),
+    Column("most", "REAL", "quantity's", "the most"),
     Column("largest", "INTEGER", "1", "the largest x at which the route gave a gradient"),
     Column("stopped_by", "TEXT", "", "why at no larger one"),
 )
@@ -187,7 +189,9 @@ BREAK_EVEN = (
     Column("points", "INTEGER", "1", "different m"),
     Column("m_largest", "INTEGER", "1", "the largest m"),
     Column("rounds", "INTEGER", "1", "interleaved rounds that times are medians of"),
-    Column("break_even", "REAL", "1", "m at which the lines cross; NULL where slopes are not told apart or it is <= 0"),
+    Column(
+        "break_even", "REAL", "1", "m at which the lines cross, be it below 1; NULL where slopes are not told apart"
+    ),
     Column("break_even_low", "REAL", "1", "lower end of its 95 % confidence interval (Fieller 1954)"),
     Column("break_even_high", "REAL", "1", "upper end"),
     Column("says", "TEXT", "", "which is cheaper, and from which n_p on"),

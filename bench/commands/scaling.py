@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -90,7 +91,9 @@ def scaling(
     for left_out in case.left_out([], routes):
         complain(f"left out of 'all': {left_out}")
     lost: list[str] = []
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with tables
     done = study.scaling(asked, specs, settings, keeping(kept, lost))
+    tell(None)
     tables: dict[str, list[Row]] = done.tables
     if as_json:
         echo_json({"cases": [*done.rows], **tables})
@@ -118,6 +121,15 @@ def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels:
     return sizes(specs, first, growth, levels)
 
 
+def tell(row: Row | None) -> None:
+    """What was measured last, on a line of the terminal that the next one covers; a bar that moves would be timed."""
+    if sys.stderr.isatty() and sys.stdout.isatty():
+        from bench.views.tables import titled
+
+        said = "" if row is None else f"{titled(row)} {row['route']}: {row['status']}"
+        click.echo(f"\r\x1b[K{said[:70]}", nl=False, err=True)
+
+
 def keeping(kept: Path | None, lost: list[str]) -> Callable[[Outcome], None]:
     """Puts a case into the store as soon as it is known; `lost` says why one is not there."""
     from bench.store import Store
@@ -132,5 +144,6 @@ def keeping(kept: Path | None, lost: list[str]) -> Callable[[Outcome], None]:
             lost.append(str(error))
         if debugging():
             click.echo(outcome.traceback or "", err=True, nl=False)
+        tell(outcome.row)
 
     return append

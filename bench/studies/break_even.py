@@ -70,12 +70,13 @@ def break_even(sizes: Sizes, every: Sequence[Series], settings: Settings, found:
     """Let the routes of PAIRS among `every` race on the largest problem that is affordable; why not, or None."""
     runners: dict[str, RouteSpec] = {}
     for series in every:
-        if series.route.route.name in RUNNERS and series.rows:
+        priced = any(row["predicted_s"] is not None for _, row in series.cases)  # too dear as a whole is no obstacle
+        if series.route.route.name in RUNNERS and priced:
             runners.setdefault(series.route.route.name, series.route)
     pairs = [pair for pair in PAIRS if runners.keys() >= {*pair}]
     if not pairs:
         return f"takes two of {', '.join(RUNNERS)}"
-    spec, least = affordable(sizes, every, runners, settings.budget)
+    spec, least = affordable(sizes, every, settings.budget)
     if spec is None:
         return f"{ROUNDS} rounds take {duration(least)} at the smallest size > --budget {settings.budget:g} s"
     try:
@@ -86,16 +87,14 @@ def break_even(sizes: Sizes, every: Sequence[Series], settings: Settings, found:
     return None if found else f"{spec.name}: fewer than {FEWEST} numbers of parameters"
 
 
-def affordable(
-    sizes: Sizes, every: Sequence[Series], runners: Mapping[str, RouteSpec], budget: float
-) -> tuple[ProblemSpec | None, float]:
-    """The largest problem that two runners ran on and a race is predicted to be paid on, and its seconds."""
+def affordable(sizes: Sizes, every: Sequence[Series], budget: float) -> tuple[ProblemSpec | None, float]:
+    """The largest problem that is known to be solved and on which a race is predicted to be paid, and its seconds."""
     forward: dict[int, list[float]] = {}
     for series in every:
         for spec, row in series.cases:
-            if series.route in runners.values() and row["status"] == "ok":
+            if row["status"] == "ok":
                 forward.setdefault(sizes.specs.index(spec), []).append(row["forward_s"])
-    bills = {size: ROUNDS * LEAST * min(seconds) for size, seconds in forward.items() if len(seconds) > 1}
+    bills = {size: ROUNDS * LEAST * min(seconds) for size, seconds in forward.items()}
     paid = [size for size, seconds in bills.items() if seconds <= budget]
     if not paid:
         return None, min(bills.values(), default=np.inf)

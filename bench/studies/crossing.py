@@ -28,7 +28,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Crossing:
-    """m at which the lines meet, with its interval; None where the slopes are not told apart, or there is none > 0."""
+    """m at which the lines meet, be it below 1 or 0, with its interval; None where the slopes are not told apart."""
 
     at: float | None
     low: float | None = None
@@ -67,9 +67,7 @@ def crossing(first: Line, second: Line) -> Crossing:
         return Crossing(None)
     root = np.sqrt(max(half * half - square * rest, 0.0))
     high = float((-half + root) / square)
-    if -a / b <= 0.0:
-        return Crossing(None)
-    return Crossing(-a / b, max(0.0, float((-half - root) / square)), high)
+    return Crossing(-a / b, float((-half - root) / square), high)
 
 
 def cheaper(names: tuple[str, str], lines: tuple[Line, Line], m_measured: float) -> str:

@@ -73,9 +73,7 @@ def power(x: Array, y: Array) -> Fit:
     c = overhead(x, y) if len(x) > FEWEST else 0.0
     used = c <= OVERHEAD * y
     if used.sum() < FEWEST:
-        seen = f"a constant is more than {OVERHEAD:.0%} of it at all but {used.sum()} of {len(x)} sizes".replace(
-            "%", " %"
-        )
+        seen = f"overhead is more than {100 * OVERHEAD:.0f} % at {(~used).sum()} of {len(x)} sizes"
         return Fit(no_law=seen, constant=c, points=int(used.sum()))
     c = 0.0 if used.all() else c
     sizes, values = x[used], y[used] - c

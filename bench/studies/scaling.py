@@ -35,6 +35,8 @@ class Growth:
     quantity: str
     against: str
     fit: Fit = field(repr=False)
+    least: float | None
+    most: float | None
     largest: int | None
     stopped_by: str
 
@@ -144,12 +146,13 @@ def _over(sizes: Sizes, series: Series, at: str, against: str, rows: Sequence[Ro
     largest = max((int(abscissa(row, against) or 0) for row in rows), default=None)
     for quantity in QUANTITIES:
         known = _known(rows, against, quantity)
-        if quantity == against or (quantity != "seconds" and not any(y for _, y in known)):
+        y = [value for _, value in known]
+        if quantity == against or (quantity != "seconds" and not any(y)):
             continue
-        found = fit([x for x, _ in known], [y for _, y in known], quantity in COUNTED)
+        found = fit([x for x, _ in known], y, quantity in COUNTED)
         route = series.route
         names = (first.name, family, at, route.route.name, route.options, quantity, against)
-        yield Growth(*names, found, largest, series.stopped_by)
+        yield Growth(*names, found, min(y, default=None), max(y, default=None), largest, series.stopped_by)
 
 
 def _known(rows: Iterable[Row], against: str, quantity: str) -> list[tuple[float, float]]:

@@ -116,7 +116,7 @@ def plots(done: Scaling, width: int) -> RenderableType:
     memory = _curves(every, against, "peak_bytes") if width >= WIDE else []
     title = f"{family(done)}: time [s]"
     label = {"n_state": "n_u", "n_param": "n_p"}.get(against, against)
-    if not memory:
+    if all(len(curve.x) < 2 for curve in memory):
         return plot(time, label, title, width)
     each = (width - 4) // 2
     out = Table.grid(padding=(0, 4, 0, 0))
