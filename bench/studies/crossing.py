@@ -67,7 +67,7 @@ def crossing(first: Line, second: Line) -> Crossing:
         return Crossing(None)
     root = np.sqrt(max(half * half - square * rest, 0.0))
     high = float((-half + root) / square)
-    return Crossing(-a / b, float((-half - root) / square), high)
+    return Crossing(-a / b + 0.0, float((-half - root) / square), high)
 
 
 def cheaper(names: tuple[str, str], lines: tuple[Line, Line], m_measured: float) -> str:
