@@ -195,6 +195,7 @@ def test_an_interrupt_keeps_what_is_measured() -> None:
     done = scaling(sizes_of("bar"), case.routes(["adjoint"]), QUICK, measure=measure)
     assert done.interrupted
     assert [row["n_state"] for row in done.rows] == [8]
+    assert done.series[0].stopped_by == "interrupted: at n=16"
     with pytest.raises(KeyboardInterrupt):
         scaling(sizes_of("bar", first=16), case.routes(["adjoint"]), QUICK, measure=measure)
 

@@ -79,6 +79,10 @@ class Climb:
                     waiting.remove(series)
                     series.take(spec, outcome.row)
                     yield outcome
+            except KeyboardInterrupt:
+                for series in self.live:
+                    series.stop("interrupted", f"at {self.sizes.label(spec)}")
+                raise
             except RoutesError as failure:  # a problem that cannot be had so large
                 if not any(series.cases for series in self.series):
                     raise
