@@ -14,6 +14,7 @@ import click
 from bench.commands.check import check
 from bench.commands.kink import kink
 from bench.commands.run import run, show
+from bench.commands.scaling import scaling
 from bench.commands.shared import complain, debug_option, debugging, store_option
 from bench.commands.status import status
 from bench.commands.tolerance import tolerance
@@ -22,7 +23,7 @@ from bench.commands.vcurve import vcurve
 from problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
-KEEPING = ("run", "tolerance")  # verbs that an interrupt does not rob of what they have
+KEEPING = ("run", "tolerance", "scaling")  # verbs that an interrupt does not rob of what they have
 
 
 class Routes(click.Group):
@@ -138,3 +139,4 @@ def report(store: Path) -> None:
 
 main.add_command(tolerance)
 main.add_command(unrolling)
+main.add_command(scaling)
