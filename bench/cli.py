@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import click
 
 from bench.commands.check import check
+from bench.commands.invert import invert
 from bench.commands.kink import kink
 from bench.commands.run import run, show
 from bench.commands.scaling import scaling
@@ -23,7 +24,7 @@ from bench.commands.vcurve import vcurve
 from problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
-KEEPING = ("run", "tolerance", "scaling")  # verbs that an interrupt does not rob of what they have
+KEEPING = ("run", "tolerance", "scaling", "invert")  # verbs that an interrupt does not rob of what they have
 
 
 class Routes(click.Group):
@@ -140,3 +141,4 @@ def report(store: Path) -> None:
 main.add_command(tolerance)
 main.add_command(unrolling)
 main.add_command(scaling)
+main.add_command(invert)

@@ -312,6 +312,19 @@ class Block(Problem):
         other.d = d
         return other
 
+    def load_cases(self) -> list[Problem]:
+        """Each with the whole of Phi."""
+        cases = len(self.mechanics.directions)
+        return [self._alone(case) for case in range(cases)] if cases > 1 else []
+
+    def _alone(self, case: int) -> Block:
+        other, supports, of = copy.copy(self), self.mechanics.supports, slice(case, case + 1)
+        other.__dict__.pop("_sampling", None)
+        alone = replace(supports, index=supports.index[of])
+        other.mechanics = replace(self.mechanics, supports=alone, directions=self.mechanics.directions[of])
+        other.d, other.n_state = self._data()[of], alone.n_u
+        return other
+
     # --- what a person looks at
 
     def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:

@@ -268,6 +268,10 @@ class Problem:
         """This problem with the data its sensors read of the state u (n_u,), and noise on them if it was asked for."""
         raise NotOffered(f"{self.name}: has no synthetic data")
 
+    def load_cases(self) -> list[Problem]:
+        """This problem with the data of one load case each, whose misfits add up to its own; none where it has one."""
+        return []
+
     def active_set(self, u: Array, p: Array) -> Hashable | None:
         """Which smooth branch of a piecewise smooth R holds at (u, p), a word or a tuple; None where R is smooth."""
         return None

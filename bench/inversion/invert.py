@@ -12,14 +12,14 @@ import numpy as np
 
 from bench.case import ProblemSpec, RouteSpec, point
 from bench.inversion.history import History, Iterate, Watch
-from bench.inversion.objective import Objective
+from bench.inversion.objective import Evaluation, Objective
 from bench.inversion.optimizers import Limits, Name, optimizer
 from bench.inversion.variables import Positive, Variables
 from bench.options import options_of
 from bench.rows import Row
 from bench.selector import written
 from problems.errors import RoutesError
-from problems.problem import Array, Problem
+from problems.problem import Array, Offers, ParameterView, Problem
 from routes.newton import Solver
 from routes.route import Options
 
@@ -51,7 +51,7 @@ class Engine:
 class Inversion:
     """What came of it: columns as in bench.study_rows, and the arrays behind them.
 
-    p, gradient (n_p,) at the end; start p_0; truth where known; blind where no datum depends on p_i; `end` says why it
+    p, gradient (n_p,) at the end; start p_0; truth where known; view, what the problem shows beside; `end` says why it
     stopped, and `interrupted` that Ctrl-C did; warning is of scaling.
     """
 
@@ -71,7 +71,7 @@ class Inversion:
     p: Array = field(repr=False)
     gradient: Array = field(repr=False)
     truth: Array | None = field(repr=False)
-    blind: Array | None = field(repr=False)
+    view: ParameterView = field(repr=False)
     end: str = field(repr=False)
     interrupted: bool = field(repr=False)
     warning: str | None = field(repr=False)
@@ -98,7 +98,7 @@ class Inversion:
             "estimate": self.p[i],
             "truth": None if self.truth is None else self.truth[i],
             "gradient": self.gradient[i],
-            "blind": None if self.blind is None else int(self.blind[i]),
+            "blind": None if self.view.blind is None else int(self.view.blind[i]),
         }
 
 
@@ -118,6 +118,8 @@ def invert(
     `made` is the problem if it is built already; `run` an optimizer in place of the engine's.
     Raises InputError, DomainError, and what the first evaluation raises.
     """
+    import scipy.optimize  # noqa: F401 - loaded before the clock starts
+
     problem = made or spec()
     p_0 = point(problem, at)
     p = p_0 if start is None else problem.parameters.check(start, f"{problem.name}, resumed")
@@ -156,7 +158,7 @@ def invert(
         best.p,
         best.gradient,
         truth,
-        blind(problem, best.p),
+        view(problem, best),
         end,
         interrupted,
         variables.warning(data(problem, best.p)),
@@ -181,9 +183,8 @@ def data(problem: Problem, p: Array) -> Array | None:
     return None if seen is None else seen.data
 
 
-def blind(problem: Problem, p: Array) -> Array | None:
-    """Which parameters no datum depends on, (n_p,), where the problem knows."""
-    try:
-        return problem.view(p, problem.initial(p), None).blind
-    except RoutesError:
-        return None
+def view(problem: Problem, found: Evaluation) -> ParameterView:
+    """What the problem shows beside a gradient, forward and adjoint strain say, and which parameters are blind."""
+    if Offers.SOLVE not in problem.offers:
+        return ParameterView()
+    return problem.view(found.p, problem.initial(found.p) if found.u is None else found.u, found.lam)

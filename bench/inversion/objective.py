@@ -21,7 +21,9 @@ STEEP = 10.0  # the wall's slope, in slopes of J at the last accepted step
 
 @dataclass(frozen=True)
 class Evaluation:
-    """J and dJ/dx at x, with p and dJ/dp; `outside` says why where J is not defined, and J is a wall."""
+    """J and dJ/dx at x, with p and dJ/dp, u and lam of routes that have them; `outside` says why where J is not
+    defined, and J is a wall.
+    """
 
     x: Array
     p: Array
@@ -29,6 +31,8 @@ class Evaluation:
     by_x: Array
     gradient: Array
     outside: str | None = None
+    u: Array | None = None
+    lam: Array | None = None
 
 
 class Objective:
@@ -103,12 +107,12 @@ class Objective:
     def _evaluate(self, x: Array) -> Evaluation:
         p = self.problem.parameters.check(self.variables.p(x), self.problem.name)
         with np.errstate(all="ignore"):
-            J, gradient, *_ = self._gradient(p)
+            J, gradient, u, _, lam, _ = self._gradient(p)
             J = self.model.value(p) if J is None else float(J)
         g = np.asarray(gradient, dtype=np.float64)
         if not (np.isfinite(J) and np.isfinite(g).all()):
             raise FloatingPointError(f"{self.problem.name}: J or its gradient is not finite")
-        return Evaluation(x.copy(), p, J, g * self.variables.slope(x), g)
+        return Evaluation(x.copy(), p, J, g * self.variables.slope(x), g, u=u, lam=lam)
 
     def _wall(self, x: Array, why: str) -> Evaluation:
         last = self.accepted

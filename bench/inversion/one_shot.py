@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.case import RouteSpec, point
+from bench.inversion.invert import Engine
 from bench.inversion.least_squares import Residuals
 from bench.inversion.objective import Objective
-from problems.problem import Array
+from bench.inversion.variables import Variables
+from problems.problem import Array, Problem
 
 ROUNDING = 1e-14  # LSMR's tolerances: the answer itself, not an estimate of it
 
@@ -21,6 +24,15 @@ class OneShot:
     J: float
     products: int
     forward_solves: int
+
+
+def of_problem(problem: Problem, route: RouteSpec, engine: Engine, at: str) -> OneShot:
+    """The same from a point of the problem; raises what the first evaluation raises."""
+    p = point(problem, at)
+    variables = Variables.of(problem.parameters, p, "none", problem.name)
+    objective = Objective(problem, route.route, route.options, engine.solver, variables)
+    objective.start(p)
+    return one_shot(objective)
 
 
 def one_shot(objective: Objective) -> OneShot:
