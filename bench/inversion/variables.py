@@ -69,6 +69,6 @@ class Variables:
 
 
 def decades(values: Array) -> float:
-    """Between the least and the largest size that is not zero."""
+    """Between the lower quartile of sizes that are not zero and the largest: a few small ones are nobody's fault."""
     sizes = np.abs(values[values != 0.0])
-    return float(np.log10(sizes.max() / sizes.min())) if sizes.size else 0.0
+    return float(np.log10(sizes.max() / np.quantile(sizes, 0.25))) if sizes.size else 0.0
