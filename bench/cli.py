@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from bench.commands.check import check
+from bench.commands.compare import baseline, compare
 from bench.commands.kink import kink
 from bench.commands.shared import (
     SELECTOR,
@@ -275,3 +276,5 @@ def report(store: Path) -> None:
 
 main.add_command(tolerance)
 main.add_command(unrolling)
+main.add_command(compare)
+main.add_command(baseline)
