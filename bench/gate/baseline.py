@@ -6,13 +6,13 @@ No host, no date, three digits of what varies: measured again, few lines change.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from bench.environment import Environment, fingerprint
-from bench.gate.measured import HOW, KEPT, NUMBERS, Case, Measured, Verdict, of_store
-from bench.rows import Row, clean
+from bench.gate.measured import KEPT, Case, Measured, Verdict, of_store
+from bench.rows import COLUMNS, Column, Row, clean
 from bench.store import Store
 from problems.errors import InputError
 from routes.tally import KINDS
@@ -21,6 +21,8 @@ MARK = "gradient-routes baseline"
 VERSION = 1
 ROUNDS = 50  # ratios kept of a case: more tell ranks little and fill pages
 MAGIC = b"SQLite format 3\0"
+COLUMN = {column.name: column for column in COLUMNS}
+REQUIRED = ("problem", "route", "at", "status")
 TODO = "write it anew with `routes baseline`"
 
 
@@ -43,16 +45,13 @@ def measured(path: Path) -> Measured:
 def as_text(found: Measured) -> str:
     """The baseline as JSON."""
     environments = {fingerprint(case.environment): case.environment for case in found.cases}
-    return "\n".join(
-        [
-            "{",
-            f'"{MARK}": {VERSION},',
-            f'"environments": {{{_lines(f"{json.dumps(k)}: {_json(environments[k])}" for k in sorted(environments))}}},',
-            f'"cases": [{_lines(_json(_compact(case)) for case in sorted(found.cases, key=_order))}],',
-            f'"verdicts": [{_lines(_json(vars(verdict)) for verdict in sorted(found.verdicts, key=_order))}]',
-            "}\n",
-        ]
-    )
+    written = {
+        "cases": [_json(_compact(case)) for case in sorted(found.cases, key=_order)],
+        "verdicts": [_json(vars(verdict)) for verdict in sorted(found.verdicts, key=_order)],
+    }
+    tables = (f'"{name}": [\n' + ",\n".join(lines) + "\n]" for name, lines in written.items())
+    known = ",\n".join(f'"{key}": {_json(environments[key])}' for key in sorted(environments))
+    return ",\n".join([f'{{\n"{MARK}": {VERSION}', f'"environments": {{\n{known}\n}}', *tables]) + "\n}\n"
 
 
 def _order(of: Case | Verdict) -> tuple[str, ...]:
@@ -62,10 +61,6 @@ def _order(of: Case | Verdict) -> tuple[str, ...]:
 
 def _json(value: Any) -> str:
     return json.dumps(clean(value), allow_nan=False)
-
-
-def _lines(items: Iterable[str]) -> str:
-    return "\n" + ",\n".join(items) + "\n"
 
 
 def _compact(case: Case) -> Row:
@@ -78,6 +73,7 @@ def _compact(case: Case) -> Row:
         row["work"] = {kind: count for kind, count in row["work"].items() if count}
     every = max(1, -(-len(case.ratios) // ROUNDS))  # from beginning to end, so that a drift remains one
     row["ratios"] = [_digits(ratio, 4) for ratio in case.ratios[::every]]
+    row["fastest"] = None if case.fastest is None else _digits(case.fastest, 4)
     return row | {"environment": fingerprint(case.environment)}
 
 
@@ -125,27 +121,33 @@ def _measured(path: Path, given: Mapping[str, Any]) -> Measured:
 
 
 def _case(entry: Mapping[str, Any], environments: Mapping[str, Environment]) -> Case:
-    row: Row = {name: entry.get(name) for name in KEPT}
-    for name in ("problem", "route", "at", "status"):
-        row[name] = _text(entry[name])
-    for name in ("problem_options", "route_options", "settings"):
-        row[name] = None if row[name] is None else dict(row[name])
-    for name in (*NUMBERS, *(name for name in HOW if name not in ("reference", "memory_method"))):
-        row[name] = None if row[name] is None else float(row[name])
-    if "work" in entry:
-        unknown = set(entry["work"]) - set(KINDS)
-        if unknown:
-            raise ValueError(f"work of unknown kind {unknown.pop()!r}")
-        row["work"] = {kind: int(entry["work"].get(kind, 0)) for kind in KINDS}
-    return Case(row, environments[entry["environment"]], tuple(float(ratio) for ratio in entry["ratios"]))
+    row: Row = {name: _value(COLUMN[name], entry.get(name)) for name in KEPT}
+    row |= {name: row[name] or {} for name in ("problem_options", "route_options")}
+    absent = [name for name in REQUIRED if row[name] is None]
+    if absent:
+        raise ValueError(f"a case without {absent[0]}")
+    if row["work"] is not None:
+        row["work"] = {kind: int(row["work"].get(kind, 0)) for kind in KINDS}
+    fastest = None if entry["fastest"] is None else float(entry["fastest"])
+    return Case(row, environments[entry["environment"]], tuple(float(ratio) for ratio in entry["ratios"]), fastest)
 
 
 def _verdict(entry: Mapping[str, Any]) -> Verdict:
-    route = None if entry["route"] is None else _text(entry["route"])
-    return Verdict(_text(entry["problem"]), route, _text(entry["at"]), _text(entry["verdict"]))
+    problem, route, at, verdict = (_value(COLUMN["at"], entry[name]) for name in ("problem", "route", "at", "verdict"))
+    if None in (problem, at, verdict):
+        raise ValueError("a verdict without its problem, at or verdict")
+    return Verdict(problem, route, at, verdict)
 
 
-def _text(value: Any) -> str:
+def _value(column: Column, value: Any) -> Any:
+    """Of the column's type, or absent. Raises TypeError, ValueError, OverflowError."""
+    if value is None:
+        return None
+    if column.json:
+        return dict(value)
+    if column.type != "TEXT":
+        number = float(value)  # also of an integer that is none a float can hold: refused
+        return int(value) if column.type == "INTEGER" else number
     if not isinstance(value, str):
         raise TypeError(f"{value!r} is no text")
     return value

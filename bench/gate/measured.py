@@ -14,18 +14,23 @@ from bench.store import Store
 from problems.errors import InputError
 
 NAMES = ("problem", "problem_options", "route", "route_options", "at", "partial")
-NUMBERS = ("gradient_error", "seconds", "peak_bytes", "tape_bytes", "factor_bytes", "predicted_s")
+NUMBERS = ("work", "gradient_error", "seconds", "peak_bytes", "tape_bytes", "factor_bytes", "predicted_s")
 HOW = ("reference", "memory_method", "unstable", "isolated", "threads")
-KEPT = ("case_key", *NAMES, "settings", "status", "reason", "work", *NUMBERS, *HOW)
+KEPT = ("case_key", *NAMES, "settings", "status", "reason", *NUMBERS, *HOW)
 
 
 @dataclass(frozen=True)
 class Case:
-    """The columns KEPT of a row, where it was measured, and seconds(gradient) / seconds(forward) round by round."""
+    """The columns KEPT of a row, where it was measured, and its time.
+
+    ratios   seconds of the gradient / of a forward solve, round by round
+    fastest  the same of the fastest of each, whose rounds may differ
+    """
 
     row: Row
     environment: Environment
     ratios: tuple[float, ...] = ()
+    fastest: float | None = None
 
     @property
     def name(self) -> str:
@@ -89,8 +94,8 @@ def _cases(store: Store) -> list[Case]:
         row = from_record(record)
         case = Case({name: row[name] for name in KEPT}, environments.get(record["environment_id"], {}))
         latest[case.key] = record["case_id"], case
-    ratios = _ratios(store, {case_id for case_id, _ in latest.values()})
-    return [Case(case.row, case.environment, ratios.get(case_id, ())) for case_id, case in latest.values()]
+    times = _times(store, {case_id for case_id, _ in latest.values()})
+    return [Case(case.row, case.environment, *times.get(case_id, ())) for case_id, case in latest.values()]
 
 
 def _environments(store: Store) -> Mapping[str, Environment]:
@@ -103,17 +108,18 @@ def _environments(store: Store) -> Mapping[str, Environment]:
     }
 
 
-def _ratios(store: Store, of: set[int]) -> dict[int, tuple[float, ...]]:
-    """By case_id; gradient and forward solve of one round are neighbours in time."""
+def _times(store: Store, of: set[int]) -> dict[int, tuple[tuple[float, ...], float]]:
+    """By case_id, ratios and that of the fastest; gradient and forward solve of one round are neighbours in time."""
     seconds: defaultdict[int, dict[str, dict[int, float]]] = defaultdict(lambda: {"gradient": {}, "forward": {}})
     names, records = store.table("samples")
     case, kind, of_round, value = (names.index(name) for name in ("case_id", "kind", "round", "seconds"))
     for record in records:
-        if record[case] in of:
+        if record[case] in of and record[value] > 0:
             seconds[record[case]][record[kind]][record[of_round]] = record[value]
     return {
-        case_id: tuple(g / by["forward"][i] for i, g in by["gradient"].items() if by["forward"].get(i))
-        for case_id, by in seconds.items()
+        case_id: (tuple(g / f[i] for i, g in gs.items() if i in f), min(gs.values()) / min(f.values()))
+        for case_id, (gs, f) in ((case_id, by.values()) for case_id, by in seconds.items())
+        if gs and f
     }
 
 

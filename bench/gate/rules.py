@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite, log10
 from typing import Any
 
@@ -9,6 +10,7 @@ from bench.gate.finding import Finding, Judgement
 from bench.gate.measured import Case, Verdict
 from bench.rows import ANSWERED, Row
 from bench.views.format import bytes_, number
+from routes.tally import KINDS
 
 ROUNDING = 1e-13  # errors below are all the same: sums of another order end there
 DECADE = 1.0
@@ -41,11 +43,17 @@ def work(base: Case, new: Case) -> Finding:
     before, now = base.row["work"], new.row["work"]
     if before is None or now is None:
         return _absent("work", base, new, _counts(before), _counts(now))
-    changed = {kind: (before[kind], now[kind]) for kind in now if before[kind] != now[kind]}
+    judgement, says = counted(before, now)
+    return Finding(new.row, "work", _counts(before), _counts(now), judgement, says)
+
+
+def counted(before: Mapping[str, int], now: Mapping[str, int]) -> tuple[Judgement, str]:
+    """Which counts are others, by name; a kind that is left out was counted 0 times."""
+    pairs = {kind: (before.get(kind, 0), now.get(kind, 0)) for kind in KINDS}
+    changed = {kind: (b, n) for kind, (b, n) in pairs.items() if b != n}
     more = any(b < n for b, n in changed.values())
     judgement: Judgement = "same" if not changed else "worse" if more else "better"
-    says = ", ".join(f"{kind} {b} -> {n}" for kind, (b, n) in changed.items())
-    return Finding(new.row, "work", _counts(before), _counts(now), judgement, says)
+    return judgement, ", ".join(f"{kind} {b} -> {n}" for kind, (b, n) in changed.items())
 
 
 def _counts(work: dict[str, int] | None) -> dict[str, int] | None:

@@ -1,0 +1,36 @@
+"""Before and after every benchmark the machine is measured: what slows both slows no route."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+from calibration import calibration
+
+from problems.problem import Array
+from routes.model import Model
+from routes.route import Route
+
+
+@pytest.fixture(autouse=True)
+def calibrated(benchmark: Any) -> Iterator[None]:
+    before = calibration()
+    yield
+    benchmark.extra_info["calibration_s"] = [before, calibration()]
+
+
+@pytest.fixture
+def gradient_of(benchmark: Any):
+    """Times a route's gradient at p and notes the work of one call."""
+
+    def run(route: Route, model: Model, p: Array, **options: Any) -> Array:
+        gradient = route.prepare(model, p, **options)
+        gradient(p)  # compiled
+        before = model.tally.work
+        gradient(p)
+        benchmark.extra_info["work"] = asdict(model.tally.work - before)
+        return benchmark(gradient, p).gradient
+
+    return run
