@@ -338,8 +338,8 @@ def test_exit_code_1_on_a_regression_that_all_formats_name(cli, tmp_path: Path, 
     table = cli("compare", "base.json", "new.sqlite")
     assert table.code == 1
     for words in (
-        "worse: bar, adjoint: transposed_solves 1 -> 2",
-        "worse: bar, adjoint: agrees -> wrong-gradient",
+        "worse: adjoint on bar: transposed_solves 1 -> 2",
+        "worse: adjoint on bar: agrees -> wrong-gradient",
         "forward solves: x 2, limit x 1.25",
         "1 fwd + 1 adj -> 1 fwd + 2 adj",
         "a regression: 1 case and 1 verdict compared, 3 worse",
@@ -351,7 +351,7 @@ def test_exit_code_1_on_a_regression_that_all_formats_name(cli, tmp_path: Path, 
     ran = cli("compare", "base.json", "new.sqlite", "-o", "new.md")
     assert (ran.code, ran.err) == (1, "")
     text = (tmp_path / "new.md").read_text()
-    assert "- ❌ worse: bar, adjoint: transposed\\_solves 1 → 2" in text
+    assert "- ❌ worse: adjoint on bar: transposed\\_solves 1 → 2" in text
     assert "| bar | adjoint | ok | **1 fwd + 1 adj → 1 fwd + 2 adj** ❌ |" in text
     assert cli("compare", "base.json", "new.sqlite", "--factor", "3", "--format", "json").out.count('"worse"') == 2 + 2
 

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, shell
 
 from bench.gate.regression import FACTOR, Kernel, again, judge, of_session, read, typical, write
 from problems.errors import InputError
@@ -121,6 +121,15 @@ def test_the_committed_baseline_holds_every_route_with_its_work() -> None:
     assert len(routes) >= 15
     assert all(kernel.work and kernel.work["forward_solves"] for kernel in routes.values())
     assert all(kernel.ratio > 0 for kernel in kernels.values())
+
+
+def test_continuous_integration_runs_targets_that_exist() -> None:
+    steps = [line for line in (ROOT / ".ci/run").read_text().splitlines() if line.startswith("make ")]
+    assert "make gate" in steps
+    assert "make benchmark-regression FORM=--short" in steps
+    done = shell(f"set -e; {'; '.join(step.replace('make', 'make --dry-run', 1) for step in steps)}", ROOT)
+    assert done.returncode == 0, done.stderr
+    assert ".ci/run" in (ROOT / ".github/workflows/ci.yml").read_text()
 
 
 def test_the_calibration_takes_longer_where_the_machine_does(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -114,7 +114,7 @@ def _whose(findings: Sequence[Finding]) -> str:
     if len(findings) > FEW and findings[0].judgement != "worse":
         return f"{len(findings)} cases"
     whose = (names(finding.case) for finding in findings)
-    return ", ".join(f"{problem}, {route}" if route else problem for problem, route in whose)
+    return ", ".join(f"{route} on {problem}" if route else problem for problem, route in whose)
 
 
 def conclusion(comparison: Comparison) -> str:
