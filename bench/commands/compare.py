@@ -105,5 +105,6 @@ def baseline(output: Path, store: Path) -> None:
     output.parent.mkdir(parents=True, exist_ok=True)
     check_writable("-o", output, [store])
     write(output, found)
-    counts = [f"{len(found.cases)} cases", *([f"{len(found.verdicts)} verdicts"] if found.verdicts else [])]
-    click.echo(f"{' and '.join(counts)} of {store} in {output}")
+    counts = {"case": len(found.cases), "verdict": len(found.verdicts)}
+    said = " and ".join(f"{n} {what}{'s' if n > 1 else ''}" for what, n in counts.items() if n)
+    click.echo(f"{said} of {store} in {output}")
