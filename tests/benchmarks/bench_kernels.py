@@ -13,6 +13,7 @@ from problems.block import Block
 from problems.problem import Problem
 from routes.model import Model
 
+pytest_plugins = ("measuring",)
 pytestmark = pytest.mark.benchmark(group="kernels")
 PROBLEMS = {
     "bar[n=10000]": lambda: Bar(n=10_000),

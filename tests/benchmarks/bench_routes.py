@@ -19,6 +19,7 @@ from routes.route import Route
 from routes.tangent import tangent
 from routes.unrolled_ad import unrolled_ad
 
+pytest_plugins = ("measuring",)
 PROBLEMS = {
     "bar[n=100]": lambda: Bar(n=100),
     "block[n=2]": lambda: Block(n=2),

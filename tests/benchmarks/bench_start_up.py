@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytest_plugins = ("measuring",)
+
 
 @pytest.mark.benchmark(group="start-up", min_rounds=5)
 @pytest.mark.parametrize("arguments", [["--help"], ["list"]], ids=" ".join)

@@ -1,4 +1,7 @@
-"""Before and after every benchmark the machine is measured: what slows both slows no route."""
+"""Fixtures of benchmarks: before and after each the machine is measured, for what slows both slows no route.
+
+No conftest: tests import theirs by that name.
+"""
 
 from __future__ import annotations
 
