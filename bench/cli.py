@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import click
 
 from bench.commands.check import check
+from bench.commands.compare import baseline, compare
 from bench.commands.invert import invert
 from bench.commands.kink import kink
 from bench.commands.run import run, show
@@ -142,3 +143,5 @@ main.add_command(tolerance)
 main.add_command(unrolling)
 main.add_command(scaling)
 main.add_command(invert)
+main.add_command(compare)
+main.add_command(baseline)
