@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import click
 
 from bench.commands.check import check
+from bench.commands.identify import identify
 from bench.commands.kink import kink
 from bench.commands.run import run, show
 from bench.commands.shared import complain, debug_option, debugging, store_option
@@ -138,3 +139,4 @@ def report(store: Path) -> None:
 
 main.add_command(tolerance)
 main.add_command(unrolling)
+main.add_command(identify)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from problems.errors import DomainError, InputError, NotOffered
 
 if TYPE_CHECKING:
-    from problems.observation import Observation
+    from problems.observation import Candidates, Observation
     from problems.regularization import Prior
 
 Array = NDArray[Any]
@@ -228,6 +228,10 @@ class Problem:
 
     def observation(self, u: Array, p: Array) -> Observation | None:
         """The data term of J at (u, p), datum by datum; None where J is no sum of squares."""
+        return None
+
+    def candidates(self) -> Candidates | None:
+        """What a sensor could read; None: any unknown of the state."""
         return None
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array] | None:
