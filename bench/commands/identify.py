@@ -95,7 +95,7 @@ def identify(
     changes = [(name, text) for name, texts in given.items() for text in texts]
     specs = study.varied(problem, [*changes, *map(_change, vary)])
     if place is None:
-        refuse_given(("criterion", "afresh"), "is of sensors to place, add --place K")
+        refuse_given(("criterion", "afresh"), "is of the sensors that --place proposes")
     writable(kept)
     if vtu is not None:
         from bench.files import check_writable
