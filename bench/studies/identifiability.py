@@ -28,7 +28,7 @@ from routes.sensitivity import Sensitivity
 from routes.singular_values import Svd, randomized, whole
 
 EPS = float(np.finfo(np.float64).eps)
-WHOLE = 2000  # solves that a whole H may take
+WHOLE = posterior.MOST  # solves that a whole H may take
 SHARE = 4  # of the memory at hand, what H may take
 MODES = 32  # singular values to begin with where H is never whole
 MOST_MODES = 512
@@ -155,7 +155,7 @@ def _left_out(found: Identified) -> str:
     if found.H is not None:
         return ""
     m, n_p = found.data, len(found.state.p)
-    more = "" if found.complete else "; what they hold counts as not identifiable - ask for more: --modes"
+    more = "" if found.complete else "; rank and columns are at least what is said - ask for more: --modes"
     return (
         f"H, {m} x {n_p} ({size(8.0 * m * n_p)}), by random products: the {len(found.svd.s)} largest singular values,"
         f" the next at most {found.svd.beyond:.2g}{more}"

@@ -50,38 +50,39 @@ class Placement:
 
 def place(one: Identified, count: int, criterion: Criterion = "D", afresh: bool = False, seed: int = 0) -> Placement:
     """`count` sensors beside those of the experiment, or instead of them. Raises InputError."""
-    n_p, sigma = len(one.state.p), one.sigma
-    if not sigma:
-        raise InputError("--place: weighs what sensors see against their noise, and none is known - give --noise SIGMA")
-    if n_p > posterior.MOST or (one.H is None and not afresh):
-        raise InputError(f"--place: a dense covariance of {n_p} parameters - take at most {posterior.MOST}")
-    if count < 1:
-        raise InputError(f"--place {count} - place at least 1 sensor")
-    H = one.products
+    H, sigma, n_p = one.products, one.sigma, len(one.state.p)
+    _check(count, sigma, n_p)
     candidates, notes = _candidates(one.problem, H, afresh, seed)
     if count > len(candidates.at):
-        raise InputError(f"--place {count}: there are {len(candidates.at)} candidates - place at most that many")
-    present = np.zeros((0, n_p)) if afresh or one.H is None else one.H
+        left = "" if afresh else " that nothing measures yet"
+        raise InputError(f"--place {count}: there are {len(candidates.at)} candidates{left} - place at most that many")
+    present = np.zeros((0, n_p)) if afresh else H.dense() if one.H is None else one.H
     readings = H.seen.weight * H.readings(candidates.at)
     precision, assumed = _prior_precision(one, sigma)
     C = np.linalg.inv(precision + present.T @ present / sigma**2)
-    C_prior = np.linalg.inv(precision)
-    before = (
-        _log_det(np.eye(len(present)) + present @ C_prior @ present.T / sigma**2) if criterion == "D" else C.trace()
-    )
     chosen, gains = greedy(readings / sigma, C, count, criterion)
-    values = before + np.cumsum(gains) if criterion == "D" else before - np.cumsum(gains)
-    rows = [np.concatenate([present, readings[chosen[: k + 1]]]) for k in range(count)]
-    choices = tuple(
-        Choice(
-            candidates.label(j),
-            None if candidates.position is None else candidates.position[j],
-            float(value),
-            int((np.linalg.svd(row, compute_uv=False) > one.threshold).sum()),
-        )
-        for j, value, row in zip(chosen, values, rows, strict=True)
-    )
-    return Placement(criterion, len(candidates.at), float(before), choices, (*notes, *assumed))
+    if criterion == "D":
+        seen = present @ np.linalg.inv(precision) @ present.T
+        before = float(np.linalg.slogdet(np.eye(len(present)) + seen / sigma**2)[1])
+        values = before + np.cumsum(gains)
+    else:
+        before = float(C.trace())
+        values = before - np.cumsum(gains)
+    choices = []
+    for k, (j, value) in enumerate(zip(chosen, values, strict=True), start=1):
+        s = np.linalg.svd(np.concatenate([present, readings[chosen[:k]]]), compute_uv=False)
+        x = None if candidates.position is None else candidates.position[j]
+        choices.append(Choice(candidates.label(j), x, float(value), int((s > one.threshold).sum())))
+    return Placement(criterion, len(candidates.at), before, tuple(choices), (*notes, *assumed))
+
+
+def _check(count: int, sigma: float, n_p: int) -> None:
+    if not sigma:
+        raise InputError("--place: weighs what sensors see against their noise, and none is known - give --noise SIGMA")
+    if n_p > posterior.MOST:
+        raise InputError(f"--place: a dense covariance of {n_p} parameters - take at most {posterior.MOST}")
+    if count < 1:
+        raise InputError(f"--place {count} - place at least 1 sensor")
 
 
 def greedy(G: Array, C: Array, count: int, criterion: Criterion) -> tuple[list[int], list[float]]:
@@ -133,7 +134,3 @@ def _measured(S_u: Any) -> Array:
     S = sparse.csr_array(S_u)
     alone = np.diff(S.indptr) == 1
     return np.asarray(S.indices[S.indptr[:-1][alone]])
-
-
-def _log_det(A: Array) -> float:
-    return float(np.linalg.slogdet(A)[1])

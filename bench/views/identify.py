@@ -71,7 +71,10 @@ def says(one: Identified) -> Iterator[Text]:
     """The rank in a sentence, and what must be read beside it."""
     kinds, n_p = one.kinds, len(one.state.p)
     least = "" if one.complete else "at least "
-    floor = f"noise {one.sigma:.2g}" if one.sigma and one.threshold == one.sigma else f"rounding {one.threshold:.2g}"
+    weight = one.products.seen.weight
+    weighted = "" if weight == 1.0 else f" ({one.sigma / weight:.2g} of a reading, weighted as in J)"
+    above_rounding = one.sigma and one.threshold == one.sigma
+    floor = f"noise {one.sigma:.2g}{weighted}" if above_rounding else f"rounding {one.threshold:.2g}"
     counts = ", ".join(f"{int((kinds == kind).sum())} {kind}" for kind in KINDS)
     ratio = f"; singular values {one.svd.s[0]:.3g} to {one.svd.s[-1]:.2g}" if len(one.svd.s) else ""
     yield Text.assemble(
