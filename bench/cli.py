@@ -13,6 +13,7 @@ import click
 
 from bench.commands.check import check
 from bench.commands.compare import baseline, compare
+from bench.commands.identify import identify
 from bench.commands.invert import invert
 from bench.commands.kink import kink
 from bench.commands.run import run, show
@@ -145,3 +146,4 @@ main.add_command(scaling)
 main.add_command(invert)
 main.add_command(compare)
 main.add_command(baseline)
+main.add_command(identify)

@@ -14,7 +14,7 @@ import numpy as np
 
 from problems.errors import InputError, check_applies
 from problems.inherited import inherited
-from problems.observation import Observation, selection
+from problems.observation import Candidates, Observation, selection
 from problems.problem import Array, Fields, Linearization, Offers, Operator, Parameters, ParameterView, Problem, Traced
 from problems.regularization import WIDTH as JUMP
 from problems.regularization import FieldPhi, Prior
@@ -164,7 +164,12 @@ class Advection(Problem):
     def observation(self, u: Array, p: Array) -> Observation:
         root = math.sqrt(self.w)
         S_u = selection(self.seen, self.n_state, root)
-        return Observation(root * u[self.seen], root * self._data(), S_u, sigma=root * self.noise)
+        return Observation(root * u[self.seen], root * self._data(), S_u, sigma=root * self.noise, weight=root)
+
+    def candidates(self) -> Candidates:
+        """The temperature of every node that the flow does not enter by."""
+        x = self.supg.x
+        return Candidates(np.arange(len(x)), lambda j: f"u at ({x[j, 0]:.3g}, {x[j, 1]:.3g})", x)
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         return self.regularization, self._theta(p), np.ones_like(p) if self.log or self.of_source else 1.0 / p

@@ -16,7 +16,7 @@ from problems.elements import ElementName
 from problems.errors import InputError, check_applies
 from problems.inherited import inherited
 from problems.mechanics import Load, Mechanics
-from problems.observation import Observation
+from problems.observation import Candidates, Observation
 from problems.problem import Array, Fields, Linearization, Offers, Operator, ParameterView, Problem, Traced
 from problems.regularization import WIDTH as JUMP
 from problems.regularization import Phi, Prior
@@ -248,8 +248,18 @@ class Block(Problem):
     def _datum(self, k: int) -> str:
         points, components = np.nonzero(self.probes.seen)
         case, k = divmod(k, len(points))
+        return self._reading(int(components[k]), self.probes.x[points[k]], case)
+
+    def _reading(self, component: int, x: Array, case: int) -> str:
         which = f", case {case + 1}" if len(self.mechanics.directions) > 1 else ""
-        return f"u_{'xyz'[components[k]]} at ({', '.join(f'{x:.3g}' for x in self.probes.x[points[k]])}){which}"
+        return f"u_{'xyz'[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){which}"
+
+    def candidates(self) -> Candidates:
+        """Every free displacement component of every node, in every load case."""
+        supports, X = self.mechanics.supports, self.body.geometry.X
+        case, node, component = np.nonzero(supports.index < supports.n_free)
+        at = case * supports.n_free + supports.index[case, node, component]
+        return Candidates(at, lambda j: self._reading(int(component[j]), X[node[j]], int(case[j])), X[node])
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         theta = self._theta(p)

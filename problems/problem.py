@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from problems.errors import DomainError, InputError, NotOffered
 
 if TYPE_CHECKING:
-    from problems.observation import Observation
+    from problems.observation import Candidates, Observation
     from problems.regularization import Prior
 
 Array = NDArray[Any]
@@ -247,6 +247,10 @@ class Problem:
         other = copy.copy(self)
         other.regularization = replace(self.regularization, alpha=alpha)
         return other
+
+    def candidates(self) -> Candidates | None:
+        """What a sensor could read; None: any unknown of the state."""
+        return None
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array] | None:
         """What regularizes: the prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where nothing can."""
