@@ -143,12 +143,23 @@ def no_package(folder: Path) -> None:
     (folder / "bench.py").write_text("")
 
 
+def other_dask(folder: Path) -> None:
+    info = folder / "distributed-9.9.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: distributed\nVersion: 9.9\n")
+
+
+def before_others(folder: Path) -> str:
+    """For PYTHONPATH."""
+    return os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a scheduler that cannot import this project, with two workers that no test harms."""
     folder = tmp_path_factory.mktemp("pair")
     no_package(folder)
-    with site(folder, PYTHONPATH=str(folder)) as made, made.workers(2, "--no-nanny"):
+    with site(folder, PYTHONPATH=before_others(folder)) as made, made.workers(2, "--no-nanny"):
         yield made.address
 
 
@@ -315,12 +326,29 @@ def test_a_worker_that_differs_is_refused(
     spoilt = tmp_path / "spoilt"
     spoilt.mkdir()
     spoil(spoilt)
-    with lone.workers(1, "--no-nanny", PYTHONPATH=str(spoilt)):
+    with lone.workers(1, "--no-nanny", PYTHONPATH=before_others(spoilt)):
         ran = cli(*command("bar", *QUICK, address=lone.address))
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("routes: Dask worker tcp://127.0.0.1:")
     assert said in ran.err
     assert ran.err.endswith(" - install the same there, gradient-routes 0.1.0\n")
+
+
+def test_a_scheduler_of_another_dask_is_refused(tmp_path: Path, cli) -> None:
+    other_dask(tmp_path)
+    with site(tmp_path, PYTHONPATH=before_others(tmp_path)) as made:
+        ran = cli(*command("bar", *QUICK, address=made.address))
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith(f"routes: --scheduler {made.address}: has distributed 9.9 (here ")
+    assert ran.err.count("\n") == 1
+
+
+def test_what_a_worker_cannot_read_is_a_row(pair: str, cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.executors.dispatch.packed", lambda *case: b"no pickle")
+    (row,) = cli(*command("bar", *QUICK, address=pair)).rows
+    assert row["status"] == "failed"
+    assert row["reason"].startswith("adjoint on worker tcp://127.0.0.1:")
+    assert "UnpicklingError" in row["reason"]
 
 
 def outcomes(address: str, patience: float) -> Iterator[Outcome]:

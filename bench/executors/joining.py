@@ -7,6 +7,7 @@ import signal
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from multiprocessing import resource_tracker
 
 from distributed import Client, LocalCluster
@@ -19,7 +20,7 @@ TIMEOUT = 10.0  # [s] for a scheduler to answer
 
 @contextmanager
 def joined(address: str) -> Iterator[Client]:
-    """A client of the scheduler at `address`. Raises InputError where none answers."""
+    """A client of the scheduler at `address`. Raises InputError where none answers, or one of another Dask."""
     quiet()
     try:
         with warnings.catch_warnings():
@@ -32,6 +33,9 @@ def joined(address: str) -> Iterator[Client]:
             " - start one: dask scheduler; and give the address it prints"
         ) from error
     with client:
+        theirs, ours = client.run_on_scheduler(version, "distributed"), version("distributed")
+        if theirs != ours:
+            raise InputError(f"--scheduler {address}: has distributed {theirs} (here {ours}) - install the same here")
         yield client
 
 
@@ -64,5 +68,5 @@ async def deaf() -> None:
 
 def quiet() -> None:
     """What happens to workers is told in rows and in lines of this project."""
-    for name in ("distributed", "tornado"):
+    for name in ("distributed", "distributed.client", "tornado"):  # Dask gives each a level
         logging.getLogger(name).setLevel(logging.CRITICAL)
