@@ -31,8 +31,9 @@ def _digest(path: Path, module: str) -> str:
     alone = module.startswith("_routes_")  # a file that was named, see bench.imported
     root = path.parent if alone else path.parents[module.count(".") + (path.name == "__init__.py")]
     summed = hashlib.sha256()
-    for file in sorted(closure(path, root, None if alone else module.partition(".")[0])):
-        summed.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    files = closure(path, root, None if alone else module.partition(".")[0])
+    for name, source in sorted((file.name, file.read_bytes()) for file in files):  # wherever they are installed
+        summed.update(name.encode() + b"\0" + source + b"\0")
     return summed.hexdigest()
 
 

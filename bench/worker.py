@@ -59,7 +59,7 @@ class Measure:
         from problems.errors import DomainError, InputError
 
         channel.say("environment", environment())
-        row = self.row | {"prepare_s": age()}
+        row = self.row | {"prepare_s": (self.row["prepare_s"] or 0.0) + age()}
         channel.say("known", ("the building of its problem", row))
         try:
             bench = Workbench(self.problem, self.settings, self.found)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bench.commands.limited import limit_options, pin
+from bench.commands.executing import executor_options
+from bench.commands.limited import limit_options
 from bench.commands.shared import (
     SELECTOR,
     at_option,
@@ -27,11 +28,11 @@ from bench.commands.shared import (
 from problems.errors import InputError
 
 if TYPE_CHECKING:
+    from bench.commands.executing import Executing
     from bench.expected import Expectation
     from bench.isolation.limits import Limits
     from bench.outcome import Outcome, View
     from bench.rows import Row
-    from bench.runner import How
     from bench.store import Store
     from routes.newton import Solver
 
@@ -43,7 +44,6 @@ DIRECTIONS = "Only the slopes of J along so many random directions."
 VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView; for one problem and one route."
 BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 TIMING = "Without, gradients are computed and judged, their work counted and memory read, but not timed."
-JOBS = "Cases side by side; for --no-timing only, they are in each other's way."
 RESUME = "Only cases that the store lacks, that failed, or whose code, data or libraries have changed."
 EXPECTED = "Failures that are known, with their reasons. [expected.toml beside the store]"
 ONLY = "The same for cases of one kind; all: each again."
@@ -66,7 +66,7 @@ ONLY = "The same for cases of one kind; all: each again."
 @click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
 @click.option("--expected", type=click.Path(path_type=Path), metavar="FILE.toml", help=EXPECTED)
 @limit_options("a case", 600.0)
-@click.option("--jobs", type=int, default=1, show_default=True, help=JOBS)
+@executor_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
 @store_options
 @debug_option
@@ -88,7 +88,7 @@ def run(
     expected: Path | None,
     isolate: bool,
     limits: Limits,
-    jobs: int,
+    executing: Executing,
     as_json: bool,
     kept: Path | None,
 ) -> None:
@@ -103,7 +103,6 @@ def run(
     from bench import case
     from bench.files import Files
     from bench.partial import chosen
-    from bench.runner import How
     from bench.runner import run as run_cases
     from bench.store import Store
     from bench.workbench import Settings
@@ -111,7 +110,7 @@ def run(
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     partial = chosen(components, directions, seed)
-    how = _how(How(isolate, limits, jobs), timed)
+    how = executing(isolate, limits, timed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
     count = len(problem_specs) * len(route_specs)
@@ -187,19 +186,6 @@ class Done:
 
         rows = [o.row for o in self.outcomes if o.row["status"] not in ANSWERED]
         return [row for row in rows if not as_expected(row, self.known)]
-
-
-def _how(how: How, timed: bool) -> How:
-    """Raises InputError for what does not go together."""
-    if how.jobs < 1:
-        raise InputError(f"--jobs {how.jobs} - give 1 or more")
-    if how.jobs > 1 and timed:
-        raise InputError(f"--jobs {how.jobs}: cases side by side spoil each other's timing - add --no-timing")
-    if how.jobs > 1 and not how.isolate:
-        raise InputError(f"--jobs {how.jobs}: needs processes - drop --no-isolate")
-    if not how.isolate:
-        pin(how.limits)
-    return how
 
 
 def _expectations(named: Path | None, kept: Path | None) -> tuple[Expectation, ...]:

@@ -15,6 +15,7 @@ from typing import Any
 from bench.accuracy import Found
 from bench.environment import Environment
 from bench.executors.running import alone
+from bench.executors.sealed import Sealed
 from bench.isolation.limits import Limits
 from bench.isolation.process import Confined, Killed
 from bench.isolation.stack import where
@@ -22,6 +23,8 @@ from bench.outcome import Outcome, refused
 from bench.rows import Row
 from bench.worker import Call, Job, Measure
 from problems.errors import RoutesError
+
+Case = Measure | Sealed
 
 
 class Line:
@@ -71,7 +74,7 @@ class Line:
 class Isolated:
     """A case under way in a process of its own; what it has said is known whatever becomes of it."""
 
-    def __init__(self, job: Measure, limits: Limits, cwd: str | None = None) -> None:
+    def __init__(self, job: Case, limits: Limits, cwd: str | None = None) -> None:
         self.found: Found = job.found
         self.long = False
         self._row: Row = job.row
@@ -98,6 +101,10 @@ class Isolated:
 
     def close(self) -> None:
         self._line.close()
+
+    def kill(self) -> None:
+        """From another thread than the one that listens, which will hear that it has ended."""
+        self._line.process.kill()
 
     def _until(self, wanted: str) -> Outcome | None:
         """Listen until it says so, or until it has ended: then its outcome."""
@@ -164,7 +171,7 @@ def last(line: Line) -> str:
     return said[-1].strip() if said else "nothing, it said nothing"
 
 
-def whole(job: Measure, limits: Limits, cwd: str | None = None) -> Outcome:
+def whole(job: Case, limits: Limits, cwd: str | None = None) -> Outcome:
     """A case from its start to its end, timed beside no other."""
     case = Isolated(job, limits, cwd)
     try:

@@ -131,7 +131,7 @@ class Confined:
         return next((line.strip() for line in reversed(self.stderr.splitlines()) if line.strip()), "")
 
     def _listen(self, stream: IO[bytes]) -> None:
-        with suppress(OSError, ValueError):
+        with stream, suppress(OSError, ValueError):
             while piece := os.read(stream.fileno(), 65536):
                 self._stderr = (self._stderr + piece)[-KEPT:]
                 if self._talkative:
