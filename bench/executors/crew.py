@@ -63,7 +63,8 @@ class Crew:
             if address not in {*self._members, *self._refused} and asked.done():
                 self._take(address, asked)
         late = time.monotonic() > self._start + GREETING
-        if not self._met and present and (late or all(asked.done() for asked in self._asked.values())):
+        known = {*self._members, *self._refused}
+        if not self._met and present and (late or known == present):
             self._met = True
             self._tell_idle()
 
