@@ -13,7 +13,8 @@ import click
 
 from bench.commands.check import check
 from bench.commands.kink import kink
-from bench.commands.run import run, show
+from bench.commands.report import report
+from bench.commands.run import run
 from bench.commands.shared import complain, debug_option, debugging, store_option
 from bench.commands.status import status
 from bench.commands.tolerance import tolerance
@@ -126,15 +127,6 @@ def export(table: str, format: str | None, output: Path | None, store: Path) -> 
     write(Store(store), table, format or (named if named in ("parquet", "json") else "csv"), output)
 
 
-@main.command()
-@store_option
-@debug_option
-def report(store: Path) -> None:
-    """The tables of everything the store holds."""
-    from bench.store import Store
-
-    show(Store(store).rows())
-
-
+main.add_command(report)
 main.add_command(tolerance)
 main.add_command(unrolling)
