@@ -45,7 +45,6 @@ STYLE: Any = {
     "lines.markersize": 4.0,
     "legend.frameon": False,
     "legend.fontsize": 7.0,
-    "savefig.bbox": "tight",
     "svg.hashsalt": "routes",
     "pdf.fonttype": 42,
 }
@@ -72,6 +71,8 @@ def write(sections: Sequence[Section], folder: Path) -> list[str]:
     with matplotlib.rc_context(STYLE):
         for figure in (figure for section in sections for figure in section.figures if figure.series):
             made = picture(figure)
+            made.draw_without_rendering()  # what takes the time is the layout: once for all formats
+            made.set_layout_engine("none")
             for format in FORMATS:
                 path = folder / f"{figure.id}.{format}"
                 try:
@@ -207,7 +208,7 @@ def _scaled(axes: Any, which: str, axis: Axis, figure: Figure, own: Sequence[Ser
     if least is None:
         return
     if 0.0 in values:
-        scale("symlog", linthresh=least, linscale=0.5)
+        scale("symlog", linthresh=least, linscale=1.0)
     else:
         scale("log")
 

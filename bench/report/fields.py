@@ -66,7 +66,8 @@ def over(figure: Figure, rows: Sequence[Row], facets: dict[str, str]) -> Figure 
             first = len(drawn)
             drawn += [row | {"slice": label} for row in slice_]
             series.append(Series(name, INK, tuple(range(first, len(drawn))), len(made)))
-            made.append(Facet(", ".join(filter(None, (name, label))), says=facets.get(name, "")))
+            said = "" if any(s.name == name for s in series[:-1]) else facets.get(name, "")
+            made.append(Facet(", ".join(filter(None, (name, label))), says=said))
     return replace(
         figure,
         id=f"{figure.id}-cells",

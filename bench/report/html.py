@@ -109,11 +109,9 @@ def _note(note: Note) -> str:
 
 def _table(table: Table) -> str:
     """For those without JavaScript."""
-    numbers = [column.type != "TEXT" for column in table.columns]
-    head = "".join(f"<th>{escape(heading(column))}</th>" for column in table.columns)
-    lines = []
-    for row in table.rows:
-        cells = zip(table.columns, row, numbers, strict=True)
-        lines.append("".join(f"<td{' class=number' if n else ''}>{escape(shown(c, v))}" for c, v, n in cells))
+    places = [k for k, name in enumerate(table.names) if any(value is not None for value in table.column(name))]
+    columns = [(k, table.columns[k], " class=t" if table.columns[k].type == "TEXT" else "") for k in places]
+    head = "".join(f"<th>{escape(heading(column))}" for _, column, _ in columns)
+    lines = ("".join(f"<td{kind}>{escape(shown(c, row[k]))}" for k, c, kind in columns) for row in table.rows)
     body = "".join(f"<tr>{line}" for line in lines)
-    return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    return f"<div class='scroll'><table class=plain><thead><tr>{head}</thead><tbody>{body}</table></div>"

@@ -91,16 +91,17 @@
       const step = Math.ceil((b - a) / 7);
       const from = zero === null ? a : Math.max(a, low - 0.3);
       for (let k = Math.ceil(from / step) * step; k <= b; k += step) ticks.push({ v: 10 ** k, label: axis.unit in UNITS ? name(10 ** k) : power(k) });
-    } else if (log) {
+    } else if (log && b - a > 0.25) {
       for (let k = Math.floor(a); k <= b; k++) for (const m of b - a > 0.45 ? [1, 2, 5] : [1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8]) {
         const t = k + Math.log10(m);
         if (t >= a && t <= b && (zero === null || t >= low - 0.3)) ticks.push({ v: m * 10 ** k, label: name(m * 10 ** k) });
       }
     } else {
-      const raw = (b - a) / 6;
+      const [from, to] = log ? [10 ** a, 10 ** b] : [a, b];
+      const raw = (to - from) / 6;
       const size = 10 ** Math.floor(Math.log10(raw));
       const step = [1, 2, 5, 10].find((m) => m * size >= raw) * size;
-      for (let k = Math.ceil(a / step); k * step <= b; k++) ticks.push({ v: k * step, label: name(Number((k * step).toPrecision(12))) });
+      for (let k = Math.ceil(from / step); k * step <= to; k++) ticks.push({ v: k * step, label: name(Number((k * step).toPrecision(12))) });
     }
     if (zero !== null && zero >= a) ticks.push({ v: 0, label: "0" });
     return ticks;
@@ -170,6 +171,10 @@
     const view = state.views[`${facet}`] || {};
     const values = { x: [...points.map((p) => p.x), ...extra, ...guides.filter((g) => g.axis === "x").map((g) => g.value)], y: [...points.map((p) => p.y), ...guides.filter((g) => g.axis === "y").map((g) => g.value)] };
     if (figure.diagonal) values.x = values.y = [...values.x, ...values.y];
+    if (figure.mark === "cells") for (const key of ["x", "y"]) {
+      const half = gaps(points)[key] / 2;
+      values[key] = values[key].flatMap((v) => [v - half, v + half]);
+    }
     if (figure.mark === "bars" && !view.x) values.x.push(X.scale === "log" ? 0.8 : 0);
     const xs = scaleOf(X, values.x, view.x);
     const ys = bands || scaleOf(Y, values.y, view.y);
@@ -247,7 +252,7 @@
       return svg("g", {}, svg("path", { class: "guide", d: `M${x.toFixed(1)} ${box.top}V${box.bottom}` }), svg("text", { class: "remark", x: x + 5, y: box.top + 10 }, g.label));
     }
     const y = box.bottom - ys.at(g.value) * (box.bottom - box.top);
-    return svg("g", {}, svg("path", { class: "guide", d: `M${box.left} ${y.toFixed(1)}H${box.right}` }), svg("text", { class: "remark", x: box.right - 4, y: y - 5, "text-anchor": "end" }, g.label));
+    return svg("g", {}, svg("path", { class: "guide", d: `M${box.left} ${y.toFixed(1)}H${box.right}` }), svg("text", { class: "remark", x: box.left + 6, y: y - 5 }, g.label));
   };
 
   const lines = ({ table, figure, points, chosen, box, facet }) => {
@@ -322,16 +327,19 @@
     const values = figure.values.flatMap((v) => rows.map((row) => table.column[v.c].values[row])).filter((v) => v !== null);
     return [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)];
   };
-  const cells = ({ state, table, figure, points, at, value, facet, id }) => {
-    const g = svg("g", { class: "series" });
-    const [low, high] = extent(state, facet);
+  const gaps = (points) => { // sides of a cell: of the grid that points lie on, else of as many equal squares
     const unique = (key) => [...new Set(points.map((p) => Number(p[key].toPrecision(9))))].sort((a, b) => a - b);
     const [ux, uy] = [unique("x"), unique("y")];
     const gap = (u) => (u.length > 1 ? u.slice(1).reduce((least, v, k) => Math.min(least, v - u[k]), Infinity) : null);
-    const grid = ux.length * uy.length <= 4 * points.length;
     const spread = (u) => u.at(-1) - u[0] || 1;
     const side = Math.sqrt((spread(ux) * spread(uy)) / points.length);
-    const [dx, dy] = grid ? [gap(ux) || gap(uy) || 1, gap(uy) || gap(ux) || 1] : [side, side];
+    const grid = ux.length * uy.length <= 4 * points.length;
+    return grid ? { x: gap(ux) || gap(uy) || 1, y: gap(uy) || gap(ux) || 1 } : { x: side, y: side };
+  };
+  const cells = ({ state, table, figure, points, at, value, facet, id }) => {
+    const g = svg("g", { class: "series" });
+    const [low, high] = extent(state, facet);
+    const { x: dx, y: dy } = gaps(points);
     for (const p of points) {
       const [a, b] = [at({ x: p.x - dx / 2, y: p.y - dy / 2 }), at({ x: p.x + dx / 2, y: p.y + dy / 2 })];
       const shape = { x: a[0].toFixed(1), y: b[1].toFixed(1), width: (b[0] - a[0]).toFixed(1), height: (a[1] - b[1]).toFixed(1) };
@@ -483,9 +491,11 @@
       const wanted = figure.facets.map((_, k) => k).filter((k) => figure.series.some((s) => s.f === k && s.r.some((row) => kept(table, row))));
       const values = figure.mark === "cells" ? figure.values.filter((v) => table.column[v.c].values.some((w) => w !== null)) : [null];
       const room = node.clientWidth || 700;
-      const columns = wanted.length * values.length > 1 && room >= 640 ? 2 : 1;
+      const small = figure.mark === "cells";
+      const columns = Math.min(wanted.length * values.length, room >= 640 ? (small ? 4 : 2) : small && room >= 300 ? 2 : 1);
       area.style.setProperty("--columns", columns);
-      const width = Math.floor(Math.min(1040, (room - (columns - 1) * 28) / columns));
+      area.classList.toggle("small", small);
+      const width = Math.floor(Math.min(1040, (room - (columns - 1) * (columns > 2 || room < 640 ? 16 : 28)) / columns));
       const some = state.all ? wanted : wanted.slice(0, FIRST);
       area.replaceChildren(...some.flatMap((k) => values.map((value) => panel(state, k, width, value))));
       if (!wanted.length) area.append(html("p", { class: "nothing" }, "Nothing to draw with these filters."));

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 
 from bench.report.bill import FORWARD, MEMORY, SECONDS, TAPE
 from bench.report.figure import Axis, Facet, Figure, Guide, Section, Series
 from bench.report.picking import grouped, in_order, sorted_by, tabulate, text
-from bench.report.source import Source
+from bench.report.source import Source, selector
 from bench.report.style import of_routes
 from bench.report.tolerance import without_following
 from bench.rows import Column, Row
 from bench.views.format import number, seconds
 
 FEWEST = 3  # sizes of a family that make a curve
-SIZES = ("n", "nx", "ny", "nz")  # options of problems that make their size; sensors follow it
+SIZES = ("n", "nx", "ny", "nz")  # options of problems that make their size
 
 HELD = "Peak memory of one gradient; what AD tapes between its sweeps is part of it."
 
@@ -74,16 +73,10 @@ def curves(rows: Sequence[Row]) -> list[Row]:
 
 
 def family(row: Row) -> str:
-    """The problem without what makes its size."""
-    options = {name: value for name, value in (row["problem_options"] or {}).items() if name not in (*SIZES, "sensors")}
-    return _families(row["family"], json.dumps(options), row["at"], row["partial"])
-
-
-def _families(name: str, options: str, at: str, partial: str | None) -> str:
-    from bench.views.tables import named
-
-    selector = named("problem", {"problem": name, "problem_options": json.loads(options)})
-    return ", ".join(filter(None, (selector, "" if at == "start" else f"at {at}", partial or "")))
+    """The problem without what makes its size, and the settings of its run where those are unusual."""
+    options = row["problem_options"] or {}
+    settings = str(row["problem"]).removeprefix(selector("problem", row["family"], options))
+    return selector("problem", row["family"], {k: v for k, v in options.items() if k not in SIZES}) + settings
 
 
 def _dearest(rows: Sequence[Row]) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
+from bench.registry import Kind
 from bench.rows import COLUMNS, Column, Row, from_record
 from bench.store import TABLES, Store
 from bench.study_rows import STUDIES
@@ -93,10 +94,18 @@ def latest(cases: Sequence[Row]) -> list[Row]:
     newest: dict[str, Row] = {}
     for row in cases:
         newest[row["case_key"] or _unkeyed(row)] = row
-    asked_for = _cached(asked, ("problem", *ASKING))
-    by = _cached(lambda row: tables.named("route", row), ("route", "route_options"))
+    known: dict[str, str] = {}
+
+    def problem(row: Row) -> str:
+        key = json.dumps([row[name] for name in ("problem", *ASKING)])
+        if key not in known:
+            known[key] = asked(row)
+        return known[key]
+
     return [
-        row | {"family": row["problem"], "problem": asked_for(row), "by": row["route"], "route": by(row)}
+        row
+        | {"family": row["problem"], "problem": problem(row)}
+        | {"by": row["route"], "route": selector("route", row["route"], row["route_options"])}
         for row in newest.values()
     ]
 
@@ -107,20 +116,6 @@ ASKING = ("problem_options", "settings", "at", "partial")
 def _unkeyed(row: Row) -> str:
     """Of a store older than keys."""
     return json.dumps([row[name] for name in ("problem", *ASKING, "route", "route_options")], sort_keys=True)
-
-
-def _cached(name: Callable[[Row], str], columns: Iterable[str]) -> Callable[[Row], str]:
-    """A selector is written once for all rows that have it."""
-    known: dict[str, str] = {}
-    columns = tuple(columns)
-
-    def named(row: Row) -> str:
-        key = json.dumps([row[column] for column in columns])
-        if key not in known:
-            known[key] = name(row)
-        return known[key]
-
-    return named
 
 
 def newest(rows: Sequence[Row], columns: Sequence[str]) -> list[Row]:
@@ -138,17 +133,20 @@ def _named(row: Row, columns: Sequence[Column]) -> Row:
     given = {"problem": row.get("problem"), "route": row.get("route")}
     for kind in ("problem", "route"):
         if f"{kind}_options" in names:
-            given[kind] = _selector(kind, row[kind], json.dumps(row[f"{kind}_options"]))
+            given[kind] = selector(kind, row[kind], row[f"{kind}_options"])
     if "other_options" in names:
-        given["other"] = _selector("route", row["other"], json.dumps(row["other_options"]))
+        given["other"] = selector("route", row["other"], row["other_options"])
     return row | given
 
 
+def selector(kind: Kind, name: str | None, options: Row | None) -> str:
+    """What names a problem or route with these options, its defaults left out."""
+    return "" if name is None else _selector(kind, name, json.dumps(options or {}))
+
+
 @cache
-def _selector(kind: Any, name: str | None, options: str) -> str | None:
-    if name is None:
-        return None
-    return tables.named(kind, {kind: name, f"{kind}_options": json.loads(options) or {}})
+def _selector(kind: Kind, name: str, options: str) -> str:
+    return tables.named(kind, {kind: name, f"{kind}_options": json.loads(options)})
 
 
 def schema(table: str) -> dict[str, Column]:

@@ -6,10 +6,10 @@ import math
 
 from bench.report.figure import Axis, Facet, Figure, Section, Series
 from bench.report.picking import bare, by_column, grouped, in_order, real, sorted_by, tabulate
-from bench.report.source import Source
+from bench.report.source import Source, selector
 from bench.report.style import of_routes
 from bench.rows import Row
-from bench.views import tables, tolerance
+from bench.views import tolerance
 from bench.views.format import number
 
 SWEPT = real("tolerance", "1", "the one that is varied")
@@ -66,7 +66,7 @@ def _labelled(rows: list[Row]) -> list[Row]:
 def without_following(route: str, options: Row | None) -> str:
     """The selector of a route without the options that follow the problem or the tolerance."""
     kept = {name: value for name, value in (options or {}).items() if name not in FOLLOWING}
-    return tables.named("route", {"route": route, "route_options": kept})
+    return selector("route", route, kept)
 
 
 def _panel(row: Row) -> str:
