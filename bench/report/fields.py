@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from bench.report.figure import Axis, Facet, Figure, Series, Table
 from bench.report.picking import grouped, real, text
@@ -14,6 +16,7 @@ from bench.rows import Column, Row
 SLICES = 6  # of a body that are drawn
 LAYERS = 12  # heights of centroids; beyond, they are no layers and are put into slabs
 SLABS = 4
+SPARSE = 4  # places of a grid for each point: beyond, the points lie on none
 OWN = {
     "number": real("number", "1", "of the parameter"),
     "run": text("run", "route and optimizer"),
@@ -67,10 +70,11 @@ def over(figure: Figure, rows: Sequence[Row], facets: dict[str, str]) -> Figure 
             drawn += [row | {"slice": label} for row in slice_]
             series.append(Series(name, INK, tuple(range(first, len(drawn))), len(made)))
             said = "" if any(s.name == name for s in series[:-1]) else facets.get(name, "")
-            made.append(Facet(", ".join(filter(None, (name, label))), says=said))
+            made.append(Facet(", ".join(filter(None, (name, label))), says=said, cell=_sides(slice_, across)))
     return replace(
         figure,
         id=f"{figure.id}-cells",
+        title=f"{figure.title}, in slices",
         table=_table(figure, drawn),
         x=(Axis(across[0], across[0], "m"),),
         y=(Axis(across[1], across[1], "m"),),
@@ -124,6 +128,16 @@ def _slices(rows: Sequence[Row], cut: str, across: tuple[str, str]) -> dict[str,
 
 def _slab(height: float, low: float, width: float) -> int:
     return min(SLABS - 1, int((height - low) / width))
+
+
+def _sides(rows: Sequence[Row], across: tuple[str, str]) -> tuple[float, float]:
+    """Of a cell of the grid that they lie on; of as many equal squares, where they do not."""
+    x, y = (heights(rows, axis) for axis in across)
+    if len(x) * len(y) > SPARSE * len(rows):
+        side = math.sqrt((x[-1] - x[0]) * (y[-1] - y[0]) / len(rows))
+        return side, side
+    gaps = [min((b - a for a, b in pairwise(levels)), default=0.0) for levels in (x, y)]
+    return gaps[0] or gaps[1] or 1.0, gaps[1] or gaps[0] or 1.0
 
 
 def _table(figure: Figure, rows: Sequence[Row]) -> Table:

@@ -76,12 +76,13 @@ class Guide:
 
 @dataclass(frozen=True)
 class Facet:
-    """One panel of a figure: its name, a verdict, what there is to see in it."""
+    """One panel of a figure: its name, a verdict, what there is to see in it. `cell`: the sides of one."""
 
     name: str = ""
     verdict: str = ""
     says: str = ""
     guides: tuple[Guide, ...] = ()
+    cell: tuple[float, float] = (1.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from bench.report.style import Style
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
+SCRIPTS = ("numbers.js", "panel.js", "page.js")
+
 
 def page(source: Source, sections: Sequence[Section]) -> str:
     """The whole page as text."""
@@ -33,7 +35,7 @@ def page(source: Source, sections: Sequence[Section]) -> str:
         f"<nav aria-label='Sections'><ol>{links}</ol></nav></header>\n"
         "<div class='filters' role='group' aria-label='Show routes and problems' hidden></div>\n"
         f"<main>{body}</main>\n<footer>{FOOTER}</footer>\n"
-        f"<script type='application/json' id='data'>{data}</script>\n<script>{_asset('page.js')}</script>\n"
+        f"<script type='application/json' id='data'>{data}</script>\n<script>{_scripts()}</script>\n"
         "</body></html>\n"
     )
 
@@ -46,6 +48,11 @@ FOOTER = (
 
 def _asset(name: str) -> str:
     return files("bench.report").joinpath(name).read_text("utf-8")
+
+
+def _scripts() -> str:
+    """All in one scope of its own."""
+    return '"use strict";\n(() => {\n' + "".join(map(_asset, SCRIPTS)) + "})();\n"
 
 
 def _measured(source: Source) -> str:

@@ -74,7 +74,7 @@ def experiments(rows: Sequence[Row]) -> Figure | None:
     gained = max(rows, key=lambda row: row["gained"] or 0)
     says = "Directions above the noise, parameters below it, parameters that no datum depends on."
     if gained["gained"]:
-        says += f" {gained['experiment']} gains {gained['gained']} directions over the first."
+        says += f" {gained['experiment']} gains {gained['gained']} more than the first experiment."
     return Figure(
         "experiments",
         "What another experiment would tell",

@@ -107,4 +107,4 @@ def _axis(axis: Axis) -> dict[str, str]:
 
 def _facet(facet: Facet) -> dict[str, Any]:
     guides = [{"axis": g.axis, "value": g.value, "label": g.label, "column": g.column} for g in facet.guides]
-    return {"name": facet.name, "verdict": facet.verdict, "says": facet.says, "guides": guides}
+    return {"name": facet.name, "verdict": facet.verdict, "says": facet.says, "guides": guides, "cell": facet.cell}
