@@ -42,8 +42,9 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
 
     if output is not None and format is None:
         format = "md" if output.suffix.lower() in (".md", ".markdown") else "html"
+    printed = format is not None and output in (None, Path("-"))
     for line in write(kept, output, format, figures):
-        click.echo(line, err=True)
+        click.echo(line, err=printed)
 
 
 def _print(store: Store) -> None:

@@ -82,8 +82,15 @@ const panel = (state, facet, width, value) => {
   node.append(root);
   if (about.says) node.append(html("p", { class: "says" }, about.says));
   if (figure.mark === "cells") node.append(legendOfHeat(state, value, facet));
-  listen(root, { state, facet, points, box, xs, ys, X, Y, bands, redraw: () => node.replaceWith(panel(state, facet, width, value)) });
+  listen(root, { state, facet, points, box, xs, ys, X, Y, bands, redraw: () => again(state, facet, width, value, node, root) });
   return node;
+};
+
+const again = (state, facet, width, value, node, root) => { // zoomed; what had the focus keeps it
+  const focused = document.activeElement === root;
+  const next = panel(state, facet, width, value);
+  node.replaceWith(next);
+  if (focused) next.querySelector("svg")?.focus({ preventScroll: true });
 };
 
 const fit = (box, xs, ys, values, width) => { // a cell is as high as it is wide
@@ -292,6 +299,7 @@ const listen = (root, plot) => {
     const [x, y] = [0, 1].map((k) => [from[k], to[k]].sort((a, b) => a - b));
     if (x[1] - x[0] > 8 && (plot.bands || y[1] - y[0] > 8)) zoom(x, [y[1], y[0]]);
   });
+  root.addEventListener("pointercancel", () => { start = null; rubber?.remove(); rubber = null; });
   root.addEventListener("pointerleave", clear);
   root.addEventListener("blur", clear);
   root.addEventListener("dblclick", () => resetZoom(state));
