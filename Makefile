@@ -2,12 +2,16 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
+GATE := results/gate.sqlite
+# small problems, not timed: counts, errors and verdicts are exact, and time is another gate's
+MATRIX := --problem bar --problem 'block[n=2]' --problem 'advection[n=4]' --route all --no-timing --jobs 2
+CHECKED := adjoint faulty-adjoint
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint type benchmark reports clean
+.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline reports clean
 
 help: ## list these targets
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -29,6 +33,30 @@ lint: $(READY) ## style: ruff
 
 type: $(READY) ## types: mypy
 	$(BIN)/mypy
+
+define MEASURE # what fails is for the comparison to judge
+@rm -f $(GATE)
+$(BIN)/routes run $(MATRIX) --store $(GATE) >/dev/null || [ $$? -eq 1 ]
+for route in $(CHECKED); do \
+  $(BIN)/routes check --problem bar --route $$route --no-plot --store $(GATE) >/dev/null || [ $$? -ne 2 ] || exit 2; \
+done
+endef
+
+gate: $(READY) ## counts, errors and verdicts of a small matrix against results/baseline.json
+	$(MEASURE)
+	@mkdir -p .benchmarks
+	@$(BIN)/routes compare results/baseline.json $(GATE) -o .benchmarks/gate.md >/dev/null || true
+	$(BIN)/routes compare results/baseline.json $(GATE)
+
+baseline: $(READY) ## results/baseline.json anew: look at its diff
+	$(MEASURE)
+	$(BIN)/routes baseline --store $(GATE)
+
+benchmark-regression: $(READY) ## kernels and routes timed against tests/benchmarks/baseline.json
+	$(BIN)/python tests/benchmarks/gate.py $(FORM)
+
+benchmark-baseline: $(READY) ## tests/benchmarks/baseline.json anew: look at its diff
+	$(BIN)/python tests/benchmarks/gate.py --write
 
 benchmark: $(READY) ## the bar over N and routes into results/, kernels, limits, verdicts (minutes)
 	$(BIN)/routes run --problem 'bar[n=8|100|1000|10000|100000|1000000]' --route all

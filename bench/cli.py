@@ -12,9 +12,13 @@ from typing import Any, NoReturn
 import click
 
 from bench.commands.check import check
+from bench.commands.compare import baseline, compare
+from bench.commands.identify import identify
+from bench.commands.invert import invert
 from bench.commands.kink import kink
 from bench.commands.report import report
 from bench.commands.run import run
+from bench.commands.scaling import scaling
 from bench.commands.shared import complain, debug_option, debugging, store_option
 from bench.commands.status import status
 from bench.commands.tolerance import tolerance
@@ -23,7 +27,7 @@ from bench.commands.vcurve import vcurve
 from problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
-KEEPING = ("run", "tolerance")  # verbs that an interrupt does not rob of what they have
+KEEPING = ("run", "tolerance", "scaling", "invert")  # verbs that an interrupt does not rob of what they have
 
 
 class Routes(click.Group):
@@ -130,3 +134,8 @@ def export(table: str, format: str | None, output: Path | None, store: Path) -> 
 main.add_command(report)
 main.add_command(tolerance)
 main.add_command(unrolling)
+main.add_command(scaling)
+main.add_command(invert)
+main.add_command(compare)
+main.add_command(baseline)
+main.add_command(identify)

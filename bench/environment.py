@@ -29,7 +29,7 @@ def environment() -> Environment:
         "cores": os.cpu_count(),
         "usable_cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         "memory_bytes": total_bytes(),
-        "os": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "os": f"{platform.system()} {platform.release().partition('-')[0]} {platform.machine()}",
         "python": platform.python_version(),
         "blas": f"{blas.get('name')} {blas.get('version')}",
         "threads": {name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ},

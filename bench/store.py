@@ -47,8 +47,8 @@ class Store:
             try:
                 os.stat(self.path)
             except FileNotFoundError:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                tempfile.TemporaryFile(dir=self.path.parent).close()
+                there = next(folder for folder in self.path.absolute().parents if folder.exists())
+                tempfile.TemporaryFile(dir=there).close()
                 return
         with self._transaction():
             pass

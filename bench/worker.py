@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, Protocol
@@ -86,6 +87,17 @@ class Survey:
 
         for problem in self.problems:
             channel.say("surveyed", surveyed(problem, self.settings.at))
+
+
+@dataclass(frozen=True)
+class Call:
+    """function(*arguments). Says: done, and what it returned."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+    def __call__(self, channel: Channel) -> None:
+        channel.say("done", self.function(*self.arguments))
 
 
 def age() -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from problems.errors import InputError, check_applies
 from problems.inherited import inherited
-from problems.observation import Observation, selection
+from problems.observation import Candidates, Observation, selection
 from problems.problem import Array, Fields, Linearization, Offers, Operator, Parameters, ParameterView, Problem, Traced
 from problems.regularization import WIDTH as JUMP
 from problems.regularization import FieldPhi, Prior
@@ -56,6 +56,7 @@ class Advection(Problem):
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     linear = True
     structure = "general"
+    regularization: Prior
 
     def __init__(
         self,
@@ -79,7 +80,8 @@ class Advection(Problem):
             Advection, angle=angle, kappa=kappa, unknown=unknown, parametrization=parametrization, sensors=sensors,
             data=data, noise=noise, seed=seed, alpha=alpha, phi=phi, phi_width=phi_width,
         )  # fmt: skip
-        self.n, self.noise, self.seed, self.alpha = n, noise, seed, alpha
+        self.n, self.noise, self.seed = n, noise, seed
+        self.affine = unknown == "source"
         self.of_source, self.log = unknown == "source", unknown == "diffusivity" and parametrization != "raw"
         b = direction(angle)
         self.supg = Supg.of(n, b)
@@ -162,7 +164,12 @@ class Advection(Problem):
     def observation(self, u: Array, p: Array) -> Observation:
         root = math.sqrt(self.w)
         S_u = selection(self.seen, self.n_state, root)
-        return Observation(root * u[self.seen], root * self._data(), S_u, sigma=root * self.noise)
+        return Observation(root * u[self.seen], root * self._data(), S_u, sigma=root * self.noise, weight=root)
+
+    def candidates(self) -> Candidates:
+        """The temperature of every node that the flow does not enter by."""
+        x = self.supg.x
+        return Candidates(np.arange(len(x)), lambda j: f"u at ({x[j, 0]:.3g}, {x[j, 1]:.3g})", x)
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         return self.regularization, self._theta(p), np.ones_like(p) if self.log or self.of_source else 1.0 / p

@@ -16,7 +16,7 @@ import numpy as np
 
 from problems.chain import Bordered, Chain, ElementForces, cumulative_sum, difference, divergence
 from problems.errors import InputError, check_applies
-from problems.observation import Observation, selection
+from problems.observation import Candidates, Observation, selection
 from problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Reference, Traced
 from problems.regularization import WIDTH as JUMP
 from problems.regularization import FieldPhi, Prior
@@ -51,6 +51,7 @@ class Bar(Problem):
     name = "bar"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     linear = True
+    regularization: Prior
 
     def __init__(
         self,
@@ -83,7 +84,6 @@ class Bar(Problem):
         self.n, self.n_state, self.structure = n, n, "spd"
         self._meet(stop_of(stop, gap, k_c, width, "bar"))
         self.log = parametrization == "log"
-        self.alpha = alpha
         self.L_e = L / n
         self.f = np.zeros(n)  # [N]
         self.f[-1] = F
@@ -211,6 +211,11 @@ class Bar(Problem):
     def observation(self, u: Array, p: Array) -> Observation:
         at, d, nodes = self.sensors.nodes - 1, self.sensors.d, self.sensors.nodes
         return Observation(u[at], d, selection(at, self.n_state), sigma=self.noise, label=lambda k: f"u_{nodes[k]}")
+
+    def candidates(self) -> Candidates:
+        """The displacement of every node; not the force of a stop."""
+        nodes = np.arange(1, self.n + 1)
+        return Candidates(nodes - 1, lambda j: f"u_{nodes[j]}", (nodes * self.L_e)[:, None])
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         return self.regularization, self.log_modulus(p), np.ones_like(p) if self.log else 1.0 / p

@@ -16,7 +16,7 @@ from problems.elements import ElementName
 from problems.errors import InputError, check_applies
 from problems.inherited import inherited
 from problems.mechanics import Load, Mechanics
-from problems.observation import Observation
+from problems.observation import Candidates, Observation
 from problems.problem import Array, Fields, Linearization, Offers, Operator, ParameterView, Problem, Traced
 from problems.regularization import WIDTH as JUMP
 from problems.regularization import Phi, Prior
@@ -43,6 +43,7 @@ class Block(Problem):
     name = "block"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     load_steps = True
+    regularization: Prior
 
     def __init__(
         self,
@@ -131,9 +132,10 @@ class Block(Problem):
         supports = Supports.of(body, clamp, grip, directions)
         self.mechanics = Mechanics(body, chosen, supports, top, load, directions, choices[unknown](), at_rest, by_hand)
         self.parameters = self.mechanics.unknown.parameters
-        self.alpha, self.regularization = alpha, self._prior(alpha, phi, phi_width, unknown)
+        self.regularization = self._prior(alpha, phi, phi_width, unknown)
         self.n_state = supports.n_u
         self.linear = law == "linear" and load != "follower"
+        self.affine = self.linear and unknown in ("traction", "load")
         self.structure = "spd" if self.mechanics.symmetric else "general"
         self.offset = float(np.ptp(body.box, axis=0).max())  # grad u is added to 1, u to nothing larger than the body
         self.matrix_free = not by_hand
@@ -246,8 +248,18 @@ class Block(Problem):
     def _datum(self, k: int) -> str:
         points, components = np.nonzero(self.probes.seen)
         case, k = divmod(k, len(points))
+        return self._reading(int(components[k]), self.probes.x[points[k]], case)
+
+    def _reading(self, component: int, x: Array, case: int) -> str:
         which = f", case {case + 1}" if len(self.mechanics.directions) > 1 else ""
-        return f"u_{'xyz'[components[k]]} at ({', '.join(f'{x:.3g}' for x in self.probes.x[points[k]])}){which}"
+        return f"u_{'xyz'[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){which}"
+
+    def candidates(self) -> Candidates:
+        """Every free displacement component of every node, in every load case."""
+        supports, X = self.mechanics.supports, self.body.geometry.X
+        case, node, component = np.nonzero(supports.index < supports.n_free)
+        at = case * supports.n_free + supports.index[case, node, component]
+        return Candidates(at, lambda j: self._reading(int(component[j]), X[node[j]], int(case[j])), X[node])
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         theta = self._theta(p)
@@ -308,6 +320,19 @@ class Block(Problem):
     def _with_data(self, d: Array) -> Block:
         other = copy.copy(self)  # shares the geometry and what is compiled: no data in it
         other.d = d
+        return other
+
+    def load_cases(self) -> list[Problem]:
+        """Each with the whole of Phi."""
+        cases = len(self.mechanics.directions)
+        return [self._alone(case) for case in range(cases)] if cases > 1 else []
+
+    def _alone(self, case: int) -> Block:
+        other, supports, of = copy.copy(self), self.mechanics.supports, slice(case, case + 1)
+        other.__dict__.pop("_sampling", None)
+        alone = replace(supports, index=supports.index[of])
+        other.mechanics = replace(self.mechanics, supports=alone, directions=self.mechanics.directions[of])
+        other.d, other.n_state = self._data()[of], alone.n_u
         return other
 
     # --- what a person looks at

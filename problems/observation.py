@@ -21,6 +21,7 @@ class Observation:
     S_p (m, n_p)       by p with u held, None where there is none
     sigma              standard deviation of the noise on data, 0 where none is known
     label              (k) -> name of datum k
+    weight             of a reading in that sum: what the rows, the data and sigma are multiplied by
     """
 
     predicted: Array
@@ -29,6 +30,21 @@ class Observation:
     S_p: Any = None
     sigma: float = 0.0
     label: Callable[[int], str] = str
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """What a sensor could read, one unknown of the state each.
+
+    at (k,)           their numbers
+    label             (j) -> name of candidate j
+    position (k, d)   where it is read [m], d <= 3; None where nowhere
+    """
+
+    at: Array
+    label: Callable[[int], str]
+    position: Array | None = None
 
 
 def selection(at: Array, n: int, weight: float = 1.0) -> Any:

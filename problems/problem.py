@@ -8,9 +8,10 @@ It never solves and never differentiates through a solve; that is what routes ar
 
 from __future__ import annotations
 
+import copy
 import enum
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from problems.errors import DomainError, InputError, NotOffered
 
 if TYPE_CHECKING:
-    from problems.observation import Observation
+    from problems.observation import Candidates, Observation
     from problems.regularization import Prior
 
 Array = NDArray[Any]
@@ -179,6 +180,8 @@ class Problem:
     matrix_free  tangent_operator gives products with R_u without assembling it
     line_search  False where full Newton steps converge from anywhere, R being convex with R_u^{-1} >= 0 (Ortega &
                Rheinboldt 1970, 13.3.4) or an active-set search ending: halving steps would only get in the way
+    affine     u is an affine function of p: R is affine in u and p is a load
+    regularization  the prior whose weight is alpha, where there may be one
     notes      sentences a user should read beside the result
     """
 
@@ -192,6 +195,8 @@ class Problem:
     load_steps: bool = False
     matrix_free: bool = False
     line_search: bool = True
+    affine: bool = False
+    regularization: Prior | None = None
     notes: tuple[str, ...] = ()
 
     def value(self, p: Array) -> float:
@@ -230,8 +235,25 @@ class Problem:
         """The data term of J at (u, p), datum by datum; None where J is no sum of squares."""
         return None
 
+    @property
+    def alpha(self) -> float:
+        """The weight of Phi in J."""
+        return 0.0 if self.regularization is None else self.regularization.alpha
+
+    def weighted(self, alpha: float) -> Problem:
+        """This problem, its data and its mesh, with another weight of Phi."""
+        if self.regularization is None:
+            raise NotOffered(f"{self.name}: has no Phi(p) to weigh")
+        other = copy.copy(self)
+        other.regularization = replace(self.regularization, alpha=alpha)
+        return other
+
+    def candidates(self) -> Candidates | None:
+        """What a sensor could read; None: any unknown of the state."""
+        return None
+
     def prior(self, p: Array) -> tuple[Prior, Array, Array] | None:
-        """What regularizes: the prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where nothing could."""
+        """What regularizes: the prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where nothing can."""
         return None
 
     def reference(self, p: Array) -> Reference | None:
@@ -249,6 +271,10 @@ class Problem:
     def observed(self, u: Array) -> Problem:
         """This problem with the data its sensors read of the state u (n_u,), and noise on them if it was asked for."""
         raise NotOffered(f"{self.name}: has no synthetic data")
+
+    def load_cases(self) -> list[Problem]:
+        """This problem with the data of one load case each, whose misfits add up to its own; none where it has one."""
+        return []
 
     def active_set(self, u: Array, p: Array) -> Hashable | None:
         """Which smooth branch of a piecewise smooth R holds at (u, p), a word or a tuple; None where R is smooth."""

@@ -76,6 +76,15 @@ class Prior:
         jumps = self.jumps(theta)
         return np.asarray(1.0 / np.sqrt(jumps**2 + self.width**2) if self.kind == "tv" else np.ones_like(jumps))
 
+    def residuals(self, theta: Array) -> tuple[Array, Array]:
+        """rho (m,) with alpha Phi = 1/2 |rho|^2, and drho/d(D theta), (m,)."""
+        jumps, root = self.jumps(theta), math.sqrt(self.alpha)
+        if self.kind != "tv":
+            return root * jumps, np.full_like(jumps, root)
+        size = np.sqrt(jumps**2 + self.width**2)
+        half = np.sqrt((size + self.width) / 2.0)  # |j| / sqrt(2 (size - width)), without its 0 / 0
+        return root * jumps / half, root * half / size
+
     def differences(self, n: int) -> Any:
         """D as a sparse matrix (m, n)."""
         from scipy import sparse

@@ -69,6 +69,9 @@ def test_a_prior_is_its_weighted_differences(kind: str, pairs) -> None:
     by_step = [prior.value(np, theta + 1j * h * e).imag / h for e in np.eye(4)]
     np.testing.assert_allclose(prior.gradient(theta), by_step, rtol=1e-14, atol=1e-16)
     D = prior.differences(4)
+    rho, slope = prior.residuals(theta)
+    assert 0.5 * rho @ rho == pytest.approx(prior.value(np, theta), rel=1e-14)
+    np.testing.assert_allclose(D.T @ (slope * rho), by_step, rtol=1e-13, atol=1e-15)
     np.testing.assert_allclose(prior.alpha * D.T @ (prior.weights(theta) * (D @ theta)), by_step, atol=1e-15)
 
 

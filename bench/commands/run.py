@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -27,6 +27,7 @@ from bench.commands.shared import (
 from problems.errors import InputError
 
 if TYPE_CHECKING:
+    from bench.expected import Expectation
     from bench.isolation.limits import Limits
     from bench.outcome import Outcome, View
     from bench.rows import Row
@@ -44,6 +45,7 @@ BUDGET = "Skip gradients predicted to take more seconds, or more memory than the
 TIMING = "Without, gradients are computed and judged, their work counted and memory read, but not timed."
 JOBS = "Cases side by side; for --no-timing only, they are in each other's way."
 RESUME = "Only cases that the store lacks, that failed, or whose code, data or libraries have changed."
+EXPECTED = "Failures that are known, with their reasons. [expected.toml beside the store]"
 ONLY = "The same for cases of one kind; all: each again."
 
 
@@ -62,6 +64,7 @@ ONLY = "The same for cases of one kind; all: each again."
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
 @click.option("--resume", is_flag=True, help=RESUME)
 @click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
+@click.option("--expected", type=click.Path(path_type=Path), metavar="FILE.toml", help=EXPECTED)
 @limit_options("a case", 600.0)
 @click.option("--jobs", type=int, default=1, show_default=True, help=JOBS)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
@@ -82,6 +85,7 @@ def run(
     vtu: Path | None,
     resume: bool,
     only: Only | None,
+    expected: Path | None,
     isolate: bool,
     limits: Limits,
     jobs: int,
@@ -93,7 +97,7 @@ def run(
     Every case runs in a process of its own; the routes on one problem are timed in turn, a forward solve beside every
     sample. What goes wrong is a row with its reason.
 
-    Exit code: 0 all ok or skipped, 1 a case failed (its row says why), 2 wrong usage,
+    Exit code: 0 all ok, skipped or failed as expected, 1 a case failed (its row says why), 2 wrong usage,
     130 interrupted.
     """
     from bench import case
@@ -116,11 +120,12 @@ def run(
         complain(f"left out of 'all': {left_out}")
     settings = Settings(at, checked(budget), min_time, timed, gradient is not None, solver, partial, vtu is not None)
     store = None if kept is None else Store(kept)
-    wanted = _wanted(store, resume, only)
+    known = _expectations(expected, kept)
+    wanted = _wanted(store, resume, only, known)
     if store is not None:
         store.check_writable()
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
-    done = Done(store, as_json, views=gradient is not None or vtu is not None)
+    done = Done(store, as_json, known, views=gradient is not None or vtu is not None)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
     try:
         for outcome in with_progress(outcomes, count):
@@ -147,8 +152,8 @@ def run(
 class Done:
     """Outcomes as they come: kept, printed, and what of them the end still needs."""
 
-    def __init__(self, store: Store | None, as_json: bool, views: bool) -> None:
-        self.store, self.as_json, self._views = store, as_json, views
+    def __init__(self, store: Store | None, as_json: bool, known: Sequence[Expectation], views: bool) -> None:
+        self.store, self.as_json, self.known, self._views = store, as_json, known, views
         self.outcomes: list[Outcome] = []
         self.lost: list[str] = []
 
@@ -172,13 +177,16 @@ class Done:
         ordered = sorted(self.outcomes, key=lambda outcome: outcome.place)
         views = [(o.row, o.view) for o in ordered if o.view is not None and gradients]
         kept = None if self.store is None or self.lost else self.store.path
-        show([o.row for o in ordered], views, kept)
+        show([o.row for o in ordered], views, kept, self.known)
 
     @property
     def failures(self) -> list[Row]:
+        """Those that nobody expected."""
+        from bench.expected import as_expected
         from bench.rows import ANSWERED
 
-        return [o.row for o in self.outcomes if o.row["status"] not in ANSWERED]
+        rows = [o.row for o in self.outcomes if o.row["status"] not in ANSWERED]
+        return [row for row in rows if not as_expected(row, self.known)]
 
 
 def _how(how: How, timed: bool) -> How:
@@ -194,7 +202,18 @@ def _how(how: How, timed: bool) -> How:
     return how
 
 
-def _wanted(store: Store | None, resume: bool, only: Only | None) -> Callable[[Row], bool]:
+def _expectations(named: Path | None, kept: Path | None) -> tuple[Expectation, ...]:
+    from bench.expected import beside, read
+
+    if named is not None:
+        return read(named)
+    return () if kept is None else beside(kept)
+
+
+def _wanted(
+    store: Store | None, resume: bool, only: Only | None, known: Sequence[Expectation]
+) -> Callable[[Row], bool]:
+    from bench.expected import as_expected
     from bench.resume import OPEN, still_open
     from bench.runner import everything
 
@@ -202,7 +221,7 @@ def _wanted(store: Store | None, resume: bool, only: Only | None) -> Callable[[R
         refuse_given(("resume", "only"), "looks into a store, with --no-store there is none")
     if store is None or only == "all" or not (resume or only):
         return everything
-    return still_open(store, OPEN if only is None else (only,), lambda row: False)
+    return still_open(store, OPEN if only is None else (only,), lambda row: as_expected(row, known))
 
 
 def _resumed() -> str:
@@ -211,8 +230,14 @@ def _resumed() -> str:
     return shlex.join(["routes", *given, "--resume"])
 
 
-def show(rows: list[Row], views: Iterable[tuple[Row, View]] = (), kept: Path | None = None) -> None:
-    """The table, the reasons and notes below it, the gradients where they were asked for."""
+def show(
+    rows: list[Row],
+    views: Iterable[tuple[Row, View]] = (),
+    kept: Path | None = None,
+    known: Sequence[Expectation] = (),
+) -> None:
+    """The table, the reasons and notes below it, what was expected, the gradients where they were asked for."""
+    from bench.expected import judged
     from bench.views import tables
 
     if not rows:
@@ -221,6 +246,10 @@ def show(rows: list[Row], views: Iterable[tuple[Row, View]] = (), kept: Path | N
     tables.show(out, tables.results(rows))
     for line in tables.remarks(rows):
         out.print(line, soft_wrap=not out.is_terminal)
+    for row in rows:
+        verdict = judged(row, known)
+        if verdict is not None:
+            out.print(f"{tables.titled(row)}: {row['route']}: {verdict.says}", style="yellow", soft_wrap=True)
     if kept is not None:
         out.print(f"kept in {kept}", style="dim", soft_wrap=True)
     for row, view in views:

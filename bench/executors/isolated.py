@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
@@ -19,7 +20,8 @@ from bench.isolation.process import Confined, Killed
 from bench.isolation.stack import where
 from bench.outcome import Outcome, refused
 from bench.rows import Row
-from bench.worker import Job, Measure
+from bench.worker import Call, Job, Measure
+from problems.errors import RoutesError
 
 
 class Line:
@@ -140,6 +142,26 @@ class Isolated:
             "reason": f"{self._row['route']}: {status} in {self._phase}{at}: {reason}{known}",
         }
         return Outcome(row, environment=self._environment)
+
+
+def called(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Limits) -> Any:
+    """What a function of a module returns in a process of its own. Raises RoutesError where that ends before."""
+    line = Line(Call(function, arguments), limits)
+    try:
+        return line.hear()[1]
+    except Killed as limit:
+        raise RoutesError(f"{function.__name__}: {limit.status} {limit.reason} - raise the limit") from None
+    except EOFError:
+        ending = line.process.ending()
+        raise RoutesError(f"{function.__name__}: {ending.status}: {ending.reason} - see {last(line)}") from None
+    finally:
+        line.close()
+
+
+def last(line: Line) -> str:
+    """The last thing it said."""
+    said = [each for each in line.process.stderr.splitlines() if each.strip()]
+    return said[-1].strip() if said else "nothing, it said nothing"
 
 
 def whole(job: Measure, limits: Limits, cwd: str | None = None) -> Outcome:

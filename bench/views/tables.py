@@ -32,7 +32,8 @@ MANY = 64  # parameters; longer views show both ends
 def console(stderr: bool = False) -> Console:
     """A console as wide as the terminal; wide where the output is piped, so that nothing is cut."""
     stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, width=None if stream.isatty() else PIPED_WIDTH, highlight=False, emoji=False)
+    width = None if stream.isatty() else PIPED_WIDTH
+    return Console(file=stream, width=width, highlight=False, emoji=False)  # whatever becomes of sys.stdout meanwhile
 
 
 def show(out: Console, table: Table) -> None:

@@ -1,0 +1,151 @@
+"""One call of `routes invert`: what it runs, shows and keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from bench.commands.shared import complain
+from bench.units import now
+from problems.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from bench.case import ProblemSpec, RouteSpec
+    from bench.inversion.history import Iterate
+    from bench.inversion.invert import Engine, Inversion
+    from bench.rows import Row
+    from problems.problem import Array, Problem
+
+Tables = dict[str, list["Row"]]
+
+
+class Run:
+    """One call of the verb: what it shows and what it keeps."""
+
+    def __init__(
+        self, spec: ProblemSpec, routes: Sequence[RouteSpec], engine: Engine, at: str, quiet: bool, plots: bool
+    ) -> None:
+        from bench.views.tables import console
+
+        self.spec, self.routes, self.engine, self.at = spec, routes, engine, at
+        self.quiet, self.plots, self.started, self.interrupted = quiet, plots, now(), False
+        self.out: Console = console(stderr=quiet)
+
+    def each(
+        self, start: tuple[Array, int] | None, minibatch: int | None, seed: int
+    ) -> dict[str, list[dict[str, Any]]]:
+        """Route by route, then what each has paid."""
+        from bench.inversion.invert import invert
+        from bench.inversion.minibatch import minibatched
+        from bench.views import inversion as view
+
+        problem = self.spec()
+        self._baseline(problem)
+        done: list[Inversion] = []
+        p, offset = start or (None, 0)
+        for route in self.routes:
+            if self.interrupted:
+                break
+            self._title(route, problem.truth() is not None)
+            run = None if minibatch is None else minibatched(problem, route, self.engine, minibatch, seed)
+            found = invert(self.spec, route, self.engine, self.at, p, self._line, problem, run, offset)
+            done.append(found)
+            self.interrupted = found.interrupted
+            self._say(lambda found=found: view.ended(self.out, found))
+        if not self.quiet:
+            self._show(done)
+        return {name: [row for found in done for row in found.tables[name]] for name in ("inversion", "estimates")}
+
+    def sweep(self, given: tuple[float, float, int], draws: int | None) -> Tables:
+        """Over alpha, for one route."""
+        import numpy as np
+
+        from bench.inversion.lcurve import l_curve
+        from bench.inversion.tradeoff import trade_off
+        from bench.views import lcurve as view
+
+        if len(self.routes) != 1:
+            raise InputError(f"--alpha-sweep with {len(self.routes)} routes - name one, the answers are the same")
+        alphas, (route,) = [float(f"{a:.6g}") for a in np.geomspace(*given)], self.routes
+        if draws is not None:
+            trades = trade_off(self.spec, route, self.engine, alphas, draws, self.at)
+            if not self.quiet and trades:
+                if self.plots:
+                    self.out.print(view.trade_plot(trades, min(self.out.width, 100)))
+                self.out.print(view.trades(trades))
+            self.interrupted = len(trades) < len(alphas)
+            return {"tradeoff": [trade.row for trade in trades]}
+        points = l_curve(self.spec, route, self.engine, alphas, self.at, watch=self._swept)
+        self.interrupted = any(point.inversion.interrupted for point in points)
+        best = next((point for point in points if point.chosen), points[-1]).inversion
+        if not self.quiet:
+            if self.plots:
+                self.out.print(view.curve(points, min(self.out.width, 100)))
+            self.out.print(view.table(points))
+            for line in view.remarks(points):
+                self.out.print(line, soft_wrap=True)
+            self._show([best], costs=False)
+        return {"lcurve": [point.row for point in points], **best.tables}
+
+    def _baseline(self, problem: Problem) -> None:
+        """The one-shot answer, where there is one: what the loop has to beat."""
+        from bench.inversion.one_shot import of_problem
+
+        if not problem.affine or problem.observation is None:
+            return
+        found = of_problem(problem, self.routes[0], self.engine, self.at)
+        self._say(
+            lambda: self.out.print(
+                f"u is affine in p: one linear least-squares solve gives J = {found.J:.6g}, for {found.forward_solves}"
+                f" forward solves and {found.products} products with H; the loop has to beat that",
+                soft_wrap=True,
+            )
+        )
+
+    def _title(self, route: RouteSpec, truth: bool) -> None:
+        from bench.inversion.invert import selector
+        from bench.views import inversion as view
+
+        def title() -> None:
+            self.out.print(
+                f"{selector(self.spec)} by {route.name}, {self.engine.optimizer}", style="bold", soft_wrap=True
+            )
+            view.heading(self.out, truth)
+
+        self._say(title)
+
+    def _line(self, step: Iterate) -> None:
+        from bench.views import inversion as view
+
+        self._say(lambda: view.line(self.out, step))
+
+    def _swept(self, found: Inversion) -> None:
+        last = found.iterates[-1]
+        paid = f"{last.iteration} iterations, {last.seconds:.3g} s"
+        said = f"alpha = {found.alpha:.3g}: misfit {last.misfit:.4g} after {paid}"
+        if self.out.is_terminal:
+            self._say(lambda: self.out.print(said, style="dim"))
+
+    def _say(self, show: Any) -> None:
+        if not self.quiet:
+            show()
+
+    def _show(self, done: Sequence[Inversion], costs: bool = True) -> None:
+        from bench.views import inversion as view
+
+        self.out.print()
+        if self.plots and costs:
+            self.out.print(view.history(done, min(self.out.width, 100)))
+        if costs:
+            self.out.print(view.costs(done))
+            self.out.print(view.LEGEND, style="dim", soft_wrap=True)
+        self.out.print()
+        self.out.print(view.estimates(done[-1]))
+        picture = view.cells(done[-1])
+        if picture:
+            self.out.print(picture)
+        warning = done[-1].warning
+        if warning is not None:
+            complain(f"invert: {warning}")

@@ -1,0 +1,190 @@
+"""One inversion: J minimized by an optimizer that sees it through a route, from a start, on record."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bench.case import ProblemSpec, RouteSpec, point
+from bench.inversion.history import History, Iterate, Watch
+from bench.inversion.objective import Evaluation, Objective
+from bench.inversion.optimizers import Limits, Name, optimizer
+from bench.inversion.variables import Positive, Variables
+from bench.options import options_of
+from bench.rows import Row
+from bench.selector import written
+from problems.errors import RoutesError
+from problems.problem import Array, Offers, ParameterView, Problem
+from routes.newton import Solver
+from routes.route import Options
+
+SHARED = (
+    "problem",
+    "problem_options",
+    "at",
+    "n_state",
+    "n_param",
+    "route",
+    "route_options",
+    "optimizer",
+    "alpha",
+    "label",
+)
+
+
+@dataclass(frozen=True)
+class Engine:
+    """How J is minimized."""
+
+    optimizer: Name = "lbfgs"
+    limits: Limits = field(default_factory=Limits)
+    solver: Solver = field(default_factory=Solver)
+    positive: Positive = "none"
+
+
+@dataclass(frozen=True)
+class Inversion:
+    """What came of it: columns as in bench.study_rows, and the arrays behind them.
+
+    p, gradient (n_p,) at the end; start p_0; truth where known; view, what the problem shows beside; `end` says why it
+    stopped, and `interrupted` that Ctrl-C did; warning is of scaling.
+    """
+
+    problem: str
+    problem_options: Options
+    at: str
+    n_state: int
+    n_param: int
+    route: str
+    route_options: Options
+    optimizer: str
+    alpha: float
+    label: str
+    iterates: tuple[Iterate, ...] = field(repr=False)
+    made: Problem = field(repr=False)
+    start: Array = field(repr=False)
+    p: Array = field(repr=False)
+    gradient: Array = field(repr=False)
+    truth: Array | None = field(repr=False)
+    view: ParameterView = field(repr=False)
+    end: str = field(repr=False)
+    interrupted: bool = field(repr=False)
+    warning: str | None = field(repr=False)
+
+    @property
+    def shared(self) -> Row:
+        return {name: getattr(self, name) for name in SHARED}
+
+    @property
+    def tables(self) -> dict[str, list[Row]]:
+        """Tidy: one row an iterate, one a parameter."""
+        last = len(self.iterates) - 1
+        rows = [self.shared | asdict(iterate) for iterate in self.iterates]
+        rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end)))
+        return {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
+
+    def _estimate(self, i: int) -> Row:
+        q = self.made.parameters
+        x: list[Any] = [None, None, None] if q.position is None else [*q.position[i].tolist(), None, None][:3]
+        return {
+            "parameter": q.label(i),
+            **dict(zip("xyz", x, strict=True)),
+            "start": self.start[i],
+            "estimate": self.p[i],
+            "truth": None if self.truth is None else self.truth[i],
+            "gradient": self.gradient[i],
+            "blind": None if self.view.blind is None else int(self.view.blind[i]),
+        }
+
+
+def invert(
+    spec: ProblemSpec,
+    route: RouteSpec,
+    engine: Engine,
+    at: str = "start",
+    start: Array | None = None,
+    watch: Watch = lambda iterate: None,
+    made: Problem | None = None,
+    run: Callable[..., str] | None = None,
+    offset: int = 0,
+) -> Inversion:
+    """Minimize J of a problem, from `start` if given. Ctrl-C ends it, not what it has found.
+
+    `made` is the problem if it is built already; `run` an optimizer in place of the engine's.
+    Raises InputError, DomainError, and what the first evaluation raises.
+    """
+    import scipy.optimize  # noqa: F401 - loaded before the clock starts
+
+    problem = made or spec()
+    p_0 = point(problem, at)
+    p = p_0 if start is None else problem.parameters.check(start, f"{problem.name}, resumed")
+    objection = route.route.objection(problem, **route.options)
+    if objection is not None:
+        raise RoutesError(f"invert: {objection} - choose another route")
+    variables = Variables.of(problem.parameters, p, engine.positive, problem.name)
+    objective = Objective(problem, route.route, route.options, engine.solver, variables)
+    truth = problem.truth()
+    history = History(objective, truth, p_0, watch, offset=offset)
+    interrupted = False
+    with redirect_stdout(sys.stderr), np.errstate(all="ignore"):
+        try:
+            history.take(objective.start(p))
+            end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
+        except KeyboardInterrupt:
+            if not history.iterates:
+                raise
+            end, interrupted = "interrupted", True
+    best = history.best
+    assert best is not None
+    return Inversion(
+        spec.name,
+        spec.options,
+        at,
+        problem.n_state,
+        len(p),
+        route.name,
+        route.options,
+        engine.optimizer,
+        problem.alpha,
+        f"{selector(spec)} by {_of_route(route)}, {engine.optimizer}",
+        tuple(history.iterates),
+        problem,
+        p_0,
+        best.p,
+        best.gradient,
+        truth,
+        view(problem, best),
+        end,
+        interrupted,
+        variables.warning(data(problem, best.p)),
+    )
+
+
+def selector(spec: ProblemSpec) -> str:
+    """The problem without its defaults."""
+    return written(spec.name, spec.options, {n: o.default for n, o in options_of(spec.build).items()})
+
+
+def _of_route(spec: RouteSpec) -> str:
+    return written(spec.name, spec.options, {n: o.default for n, o in options_of(spec.route.function).items()})
+
+
+def data(problem: Problem, p: Array) -> Array | None:
+    """What was measured, (m,)."""
+    try:
+        seen = problem.observation(problem.initial(p), p)
+    except RoutesError:
+        return None
+    return None if seen is None else seen.data
+
+
+def view(problem: Problem, found: Evaluation) -> ParameterView:
+    """What the problem shows beside a gradient, forward and adjoint strain say, and which parameters are blind."""
+    if Offers.SOLVE not in problem.offers:
+        return ParameterView()
+    return problem.view(found.p, problem.initial(found.p) if found.u is None else found.u, found.lam)

@@ -1,0 +1,103 @@
+"""How much regularization: the L-curve (Hansen 1992), its corner, and what the noise of the data asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.case import ProblemSpec, RouteSpec
+from bench.inversion.invert import Engine, Inversion, invert
+from bench.rows import Row
+from problems.errors import InputError
+from problems.problem import Array, Problem
+from routes.model import Model
+
+BENT = 3  # points that a curvature takes
+
+
+@dataclass(frozen=True)
+class Point:
+    """The minimum of J at one alpha. Columns as in bench.study_rows."""
+
+    inversion: Inversion
+    misfit: float
+    phi: float
+    curvature: float | None
+    discrepancy: float | None
+    chosen: str | None = None
+
+    @property
+    def row(self) -> Row:
+        last = self.inversion.iterates[-1]
+        own = {name: getattr(self, name) for name in ("misfit", "phi", "curvature", "discrepancy", "chosen")}
+        counts = {"iterations": last.iteration, "forward_solves": last.forward_solves, "distance": last.distance}
+        return self.inversion.shared | own | counts
+
+
+def l_curve(
+    spec: ProblemSpec,
+    route: RouteSpec,
+    engine: Engine,
+    alphas: Sequence[float],
+    at: str = "start",
+    problem: Problem | None = None,
+    watch: Callable[[Inversion], None] = lambda inversion: None,
+) -> list[Point]:
+    """J minimized at every alpha, the largest first, each from the minimum before; corner and discrepancy marked.
+
+    Raises InputError for a problem without Phi.
+    """
+    made = problem or spec()
+    if made.regularization is None:
+        raise InputError(f"invert: {made.name} has no Phi(p) to weigh - choose a problem with alpha=")
+    found: list[Inversion] = []
+    p: Array | None = None
+    for alpha in sorted(map(float, alphas), reverse=True):
+        found.append(invert(spec, route, engine, at, p, made=made.weighted(alpha)))
+        p = found[-1].p
+        watch(found[-1])
+        if found[-1].interrupted:
+            break
+    return chosen([_point(each, engine) for each in found])
+
+
+def _point(inversion: Inversion, engine: Engine) -> Point:
+    last, problem, p = inversion.iterates[-1], inversion.made, inversion.p
+    seen = problem.observation(Model(problem, engine.solver).solve(p).u, p)
+    discrepancy = None
+    if seen is not None and seen.sigma > 0.0:
+        discrepancy = math.sqrt(2.0 * last.misfit) / (seen.sigma * math.sqrt(len(seen.data)))
+    return Point(inversion, last.misfit, last.regularization / inversion.alpha, None, discrepancy)
+
+
+def chosen(points: list[Point]) -> list[Point]:
+    """With curvatures; the corner is where the curve bends most, the discrepancy principle's choice the largest alpha
+    whose misfit is no more than noise makes (Morozov 1966).
+    """
+    bends = curvatures(points)
+    corner = max((k for k, bend in enumerate(bends) if bend is not None), key=lambda k: bends[k] or 0.0, default=None)
+    met = [k for k, point in enumerate(points) if point.discrepancy is not None and point.discrepancy <= 1.0]
+    marks: dict[int, list[str]] = {k: [] for k in range(len(points))}
+    if corner is not None and (bends[corner] or 0.0) > 0.0:
+        marks[corner].append("corner")
+    if met:
+        marks[met[0]].append("discrepancy")
+    return [
+        replace(point, curvature=bend, chosen=", ".join(marks[k]) or None)
+        for k, (point, bend) in enumerate(zip(points, bends, strict=True))
+    ]
+
+
+def curvatures(points: Sequence[Point]) -> list[float | None]:
+    """Of (log misfit, log Phi) over log alpha, by differences; None at the ends and where a logarithm has none."""
+    if len(points) < BENT or any(point.misfit <= 0.0 or point.phi <= 0.0 for point in points):
+        return [None] * len(points)
+    t = np.log([point.inversion.alpha for point in points])
+    x, y = (np.log([getattr(point, name) for point in points]) for name in ("misfit", "phi"))
+    x_1, y_1 = np.gradient(x, t), np.gradient(y, t)
+    x_2, y_2 = np.gradient(x_1, t), np.gradient(y_1, t)
+    bend = (x_1 * y_2 - x_2 * y_1) / np.maximum((x_1**2 + y_1**2) ** 1.5, 1e-300)
+    return [None, *bend[1:-1].tolist(), None]

@@ -1,0 +1,49 @@
+"""Where u is affine in p, one linear least-squares solve is the answer: what a loop of gradients has to beat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.case import RouteSpec, point
+from bench.inversion.invert import Engine
+from bench.inversion.least_squares import Residuals
+from bench.inversion.objective import Objective
+from bench.inversion.variables import Variables
+from problems.problem import Array, Problem
+
+ROUNDING = 1e-14  # LSMR's tolerances: the answer itself, not an estimate of it
+
+
+@dataclass(frozen=True)
+class OneShot:
+    """p minimizes 1/2 |H (p - p_0) + r_0|^2 + alpha Phi(p); J there, products with H and H^T, forward solves."""
+
+    p: Array
+    J: float
+    products: int
+    forward_solves: int
+
+
+def of_problem(problem: Problem, route: RouteSpec, engine: Engine, at: str) -> OneShot:
+    """The same from a point of the problem; raises what the first evaluation raises."""
+    p = point(problem, at)
+    variables = Variables.of(problem.parameters, p, "none", problem.name)
+    objective = Objective(problem, route.route, route.options, engine.solver, variables)
+    objective.start(p)
+    return one_shot(objective)
+
+
+def one_shot(objective: Objective) -> OneShot:
+    """By LSMR (Fong & Saunders 2011), SciPy's, from the start of the objective; exact where Phi is quadratic."""
+    from scipy.sparse.linalg import lsmr
+
+    assert objective.accepted is not None
+    x, before = objective.accepted.x, objective.forward_solves
+    residuals = Residuals(objective)
+    r, A = residuals(x), residuals.derivative(x)
+    step, _, iterations, *_ = lsmr(A, -r, atol=ROUNDING, btol=ROUNDING, conlim=0.0, maxiter=10 * len(x))
+    found = residuals(x + step)
+    p = objective.variables.p(x + step)
+    return OneShot(p, 0.5 * float(np.sum(found**2)), 2 * int(iterations), objective.forward_solves - before)

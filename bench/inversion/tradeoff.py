@@ -1,0 +1,78 @@
+"""Bias and variance: what regularization takes from the truth, and what noise gives to the estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.case import ProblemSpec, RouteSpec
+from bench.inversion.invert import Engine, Inversion, invert
+from bench.rows import Row
+from problems.errors import InputError
+from problems.problem import Array, Problem
+from routes.model import Model
+from routes.twin import CONVERGED
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Mean squares over the parameters, of so many draws of the noise at one alpha: total = bias + variance."""
+
+    inversion: Inversion
+    draws: int
+    bias: float
+    variance: float
+
+    @property
+    def row(self) -> Row:
+        own = {"draws": self.draws, "bias": self.bias, "variance": self.variance, "total": self.bias + self.variance}
+        return self.inversion.shared | own
+
+
+def trade_off(
+    spec: ProblemSpec, route: RouteSpec, engine: Engine, alphas: Sequence[float], draws: int, at: str = "start"
+) -> list[Trade]:
+    """J minimized for every draw of the noise at every alpha, the largest first. Raises InputError."""
+    if not spec.options.get("noise"):
+        raise InputError(f"invert: --draws {draws} of a problem without noise - write {spec.name}[noise=...]")
+    problems = drawn(spec, draws)
+    starts: list[Array | None] = [None] * draws
+    trades: list[Trade] = []
+    for alpha in sorted(map(float, alphas), reverse=True):
+        found = []
+        for k, problem in enumerate(problems):
+            found.append(invert(spec, route, engine, at, starts[k], made=problem.weighted(alpha)))
+            starts[k] = found[-1].p
+            if found[-1].interrupted:
+                return trades
+        trades.append(_trade(found))
+    return trades
+
+
+def _trade(found: Sequence[Inversion]) -> Trade:
+    p, truth = np.array([each.p for each in found]), found[0].truth
+    assert truth is not None
+    mean = p.mean(axis=0)
+    return Trade(found[0], len(found), float(np.mean((mean - truth) ** 2)), float(np.mean((p - mean) ** 2)))
+
+
+def drawn(spec: ProblemSpec, draws: int) -> list[Problem]:
+    """The problem with so many different noises on its data, the mesh and what is compiled shared where it can be."""
+    seeds = range(int(spec.options.get("seed", 0)), int(spec.options.get("seed", 0)) + draws)
+    bare: Problem = spec.build(**spec.options)
+    twin, truth = bare.twin(), bare.truth()
+    if truth is None:
+        raise InputError(f"invert: --draws {draws} of a problem whose truth is not known - take synthetic data")
+    if twin is None:
+        return [spec.build(**spec.options | {"seed": seed}) for seed in seeds]
+    u = Model(twin, CONVERGED).solve(truth).u
+
+    def noisy(seed: int) -> Problem:
+        other = copy(bare)
+        other.seed = seed  # type: ignore[attr-defined]
+        return other.observed(u)
+
+    return [noisy(seed) for seed in seeds]

@@ -1,0 +1,74 @@
+"""What an optimizer varies: x of size one, p = T(x) with the units of the problem, positive where asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from problems.errors import InputError
+from problems.problem import Array, Parameters
+
+Positive = Literal["none", "log", "softplus"]
+DECADES = 3.0  # that natural changes of parameters may span before it is worth a warning
+
+
+@dataclass(frozen=True)
+class Variables:
+    """p = s x, or p = s exp(x), or p = s log(1 + exp(x)), with s the natural changes of p at the start, (n_p,)."""
+
+    scale: Array
+    positive: Positive = "none"
+
+    @classmethod
+    def of(cls, parameters: Parameters, p: Array, positive: Positive, who: str) -> Variables:
+        """Raises InputError where p cannot be made positive."""
+        if positive != "none" and not ((p > 0.0).all() and (np.broadcast_to(parameters.lower, p.shape) <= 0.0).all()):
+            raise InputError(
+                f"{who}: --positive {positive} with a start of {p.min():g} - it is for parameters > 0; a log field is"
+                " positive already"
+            )
+        return cls(np.abs(p) if positive != "none" else parameters.scale, positive)
+
+    def p(self, x: Array) -> Array:
+        if self.positive == "log":
+            return np.asarray(self.scale * np.exp(x))
+        if self.positive == "softplus":
+            return np.asarray(self.scale * np.logaddexp(0.0, x))
+        return self.scale * x
+
+    def x(self, p: Array) -> Array:
+        q = p / self.scale
+        if self.positive == "log":
+            return np.log(q)
+        return np.asarray(q + np.log(-np.expm1(-q)) if self.positive == "softplus" else q)
+
+    def slope(self, x: Array) -> Array:
+        """dp/dx, (n_p,)."""
+        if self.positive == "log":
+            return np.asarray(self.scale * np.exp(x))
+        if self.positive == "softplus":
+            return self.scale * (0.5 * (1.0 + np.tanh(0.5 * x)))
+        return self.scale
+
+    def warning(self, data: Array | None) -> str | None:
+        """What spans decades, and the remedy; None where all is near one."""
+        spanned = decades(self.scale)
+        if spanned > DECADES:
+            return (
+                f"natural changes of parameters span {spanned:.1f} decades: an optimizer sees the large ones only -"
+                " give Parameters a scale, or take a log parametrization"
+            )
+        if data is not None and decades(data) > DECADES:
+            return (
+                f"data span {decades(data):.1f} decades: the small ones count for nothing in |S u - d|^2 - weigh them"
+                " by their noise"
+            )
+        return None
+
+
+def decades(values: Array) -> float:
+    """Between the lower quartile of sizes that are not zero and the largest: a few small ones are nobody's fault."""
+    sizes = np.abs(values[values != 0.0])
+    return float(np.log10(sizes.max() / np.quantile(sizes, 0.25))) if sizes.size else 0.0

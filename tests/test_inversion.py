@@ -1,0 +1,256 @@
+"""routes invert: from gradients to answers, and why there is none."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench import case
+from bench.inversion.invert import Engine, Inversion, invert
+from bench.inversion.lcurve import l_curve
+from bench.inversion.objective import Objective
+from bench.inversion.one_shot import one_shot
+from bench.inversion.optimizers import Limits
+from bench.inversion.tradeoff import trade_off
+from bench.inversion.variables import Variables
+from bench.store import Store
+from routes.newton import Solver
+
+TIGHT = Limits(200, 1e-12)
+
+
+def inverted(problem: str, route: str = "adjoint", **engine) -> Inversion:
+    """One inversion of selectors."""
+    (spec,), (by,) = case.problems([problem]), case.routes([route])
+    return invert(spec, by, Engine(limits=engine.pop("limits", TIGHT), **engine))
+
+
+@pytest.fixture(scope="module")
+def bar() -> Inversion:
+    return inverted("bar")
+
+
+def test_seen_moduli_are_found_and_blind_ones_stay_where_they_were(bar: Inversion) -> None:
+    """Five sensors, no noise, alpha = 0: five moduli to rounding; the tail has no gradient, so it has no step."""
+    np.testing.assert_allclose(bar.p[:5], bar.truth[:5], atol=1e-9)
+    assert (bar.p[5:] == bar.start[5:]).all()
+    assert bar.end.startswith("converged")
+
+
+def test_finite_differences_take_the_same_steps_at_the_predicted_price(bar: Inversion) -> None:
+    by_fd = inverted("bar", "fd-central")
+    shared = min(len(bar.iterates), len(by_fd.iterates))
+    for one, other in zip(bar.iterates[:shared], by_fd.iterates[:shared], strict=True):
+        assert one.distance == pytest.approx(other.distance, abs=1e-6)
+        assert other.forward_solves == 17 * one.forward_solves  # 2 n_p, and one for J
+    np.testing.assert_allclose(by_fd.p, bar.p, atol=1e-6)
+
+
+@pytest.mark.parametrize("optimizer", ["gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"])
+def test_every_optimizer_goes_to_the_same_minimum(optimizer: str) -> None:
+    problem = "bar[n=3,sensors=3,noise=0.01,alpha=1e-3]"
+    limits = Limits(400, 1e-7, rate=0.03)
+    found, reference = inverted(problem, optimizer=optimizer, limits=limits), inverted(problem)
+    assert found.iterates[-1].objective == pytest.approx(reference.iterates[-1].objective, rel=1e-8)
+    # descent and adam end where the slope is 1e-7: p then is off by that over the least curvature of J
+    np.testing.assert_allclose(found.p, reference.p, atol=1e-4)
+
+
+@pytest.mark.parametrize("positive", ["none", "log", "softplus"])
+def test_raw_moduli_are_found_from_far_away(positive: str) -> None:
+    found = inverted("bar[parametrization=raw]", positive=positive)
+    np.testing.assert_allclose(found.p[:5], found.truth[:5], rtol=1e-8)
+
+
+def test_a_step_out_of_the_domain_comes_back_and_is_said(tmp_path: Path) -> None:
+    """From moduli far too high the first steps of raw parameters overshoot below zero."""
+    (tmp_path / "p.csv").write_text("E\n" + "20\n" * 8)
+    (spec,), (route,) = case.problems(["bar[parametrization=raw]"]), case.routes(["adjoint"])
+    found = invert(spec, route, Engine(limits=TIGHT), at=str(tmp_path / "p.csv"))
+    said = [step.says for step in found.iterates if step.says]
+    assert said
+    assert all("a step was shortened" in each and "is outside" in each for each in said)
+    np.testing.assert_allclose(found.p[:5], found.truth[:5], rtol=1e-8)
+
+
+@pytest.mark.parametrize("route", ["faulty-adjoint[fault=transpose]", "faulty-adjoint[fault=otd]"])
+def test_a_gradient_that_is_not_that_of_J_is_named(route: str) -> None:
+    problem = "advection[n=4,data=twin,noise=1e-2,alpha=1e-4]"  # data met exactly leave no gradient, right or wrong
+    found = inverted(problem, route)
+    assert "the gradient is inconsistent with J" in found.end
+    assert "see routes vcurve" in found.end
+    right = inverted(problem, limits=Limits(100, 1e-8))
+    assert right.iterates[-1].objective < found.iterates[-1].objective
+    assert "inconsistent" not in right.end
+
+
+def test_one_sided_differences_stall_where_their_error_is_all_there_is() -> None:
+    found = inverted("bar", "fd-one-sided")
+    assert "the gradient is inconsistent with J" in found.end
+    assert np.abs(found.p[:5] - found.truth[:5]).max() > 1e-10
+
+
+def test_a_minimum_reached_to_rounding_blames_nobody() -> None:
+    found = inverted("bar[noise=1e-2,alpha=1e-2]", limits=Limits(300, 0.0))
+    assert "rounding" in found.end
+
+
+def test_a_diverging_run_stops_with_the_reason(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("log_E\n" + "3\n" * 8)
+    (spec,), (route,) = case.problems(["bar"]), case.routes(["adjoint"])
+    found = invert(spec, route, Engine("adam", Limits(200, 1e-8, rate=8.0)), at=str(tmp_path / "p.csv"))
+    assert found.end.startswith("diverging: J = ")
+    assert len(found.iterates) < 50
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        "advection[n=4,unknown=source,data=twin,noise=1e-3,alpha=1e-4]",
+        "block[n=2,law=linear,unknown=traction,data=twin,alpha=1e-4]",
+    ],
+)
+def test_where_u_is_affine_in_p_one_solve_is_the_answer(problem: str) -> None:
+    """The loop ends where the linear least-squares solve does, and not below."""
+    loop = inverted(problem, limits=Limits(300, 1e-9))
+    made = loop.made
+    assert made.affine
+    (route,) = case.routes(["adjoint"])
+    objective = Objective(
+        made, route.route, route.options, Solver(), Variables.of(made.parameters, loop.start, "none", "test")
+    )
+    objective.start(loop.start)
+    at_once = one_shot(objective)
+    assert loop.iterates[-1].objective == pytest.approx(at_once.J, rel=1e-6)
+    assert at_once.J <= loop.iterates[-1].objective * (1.0 + 1e-9)
+    exact, gradient, *_ = route.route.prepare(objective.model, at_once.p)(at_once.p)
+    assert exact == pytest.approx(at_once.J, rel=1e-9)
+    assert np.linalg.norm(gradient) < 1e-7 * np.linalg.norm(objective.accepted.gradient)
+
+
+def test_the_l_curve_bends_at_the_noise() -> None:
+    """Many data, few parameters: below the corner the misfit stays, above it Phi falls."""
+    (spec,), (route,) = case.problems(["bar[n=6,sensors=6,noise=0.003,seed=3]"]), case.routes(["adjoint"])
+    points = l_curve(spec, route, Engine(limits=Limits(200, 1e-8)), np.geomspace(1e-7, 1.0, 8))
+    alphas, misfits, phis = (np.array([p.row[name] for p in points]) for name in ("alpha", "misfit", "phi"))
+    assert (np.diff(alphas) < 0).all()
+    assert (np.diff(misfits) < 0).all()
+    assert (np.diff(phis) > 0).all()
+    met = [p for p in points if "discrepancy" in (p.chosen or "")]
+    assert len(met) == 1
+    assert met[0].discrepancy <= 1.0
+    assert points[points.index(met[0]) - 1].discrepancy > 1.0
+
+
+def test_bias_falls_and_variance_rises_as_regularization_goes() -> None:
+    (spec,), (route,) = case.problems(["bar[n=6,sensors=6,noise=0.003]"]), case.routes(["adjoint"])
+    trades = trade_off(spec, route, Engine(limits=Limits(200, 1e-6)), [1e-1, 1e-3, 1e-5], 6)
+    bias, variance, total = ([trade.row[name] for trade in trades] for name in ("bias", "variance", "total"))
+    assert bias[0] > 3 * bias[1]
+    assert variance[0] < variance[1] < variance[2]
+    np.testing.assert_allclose(np.add(bias, variance), total, rtol=1e-14)
+
+
+def test_minibatches_of_load_cases_are_unbiased() -> None:
+    """The mean over the cases of what a batch of one gives is the gradient of J."""
+    (spec,), (route,) = case.problems(["block[n=2,cases=3,alpha=1e-3,data=twin]"]), case.routes(["adjoint"])
+    problem = spec()
+    p = problem.parameters.start + 0.1 * np.random.default_rng(0).uniform(-1, 1, 8)
+    g, by_prior = gradient_of(problem, route, p), problem.regularization.gradient(p)
+    parts = [gradient_of(part, route, p) - by_prior for part in problem.load_cases()]
+    np.testing.assert_allclose(np.sum(parts, axis=0) + by_prior, g, rtol=1e-9, atol=1e-12 * np.abs(g).max())
+
+
+def gradient_of(problem, route, p):
+    from routes.model import Model
+
+    return route.route.prepare(Model(problem), p, **route.options)(p).gradient
+
+
+def test_rows_are_kept_and_resumed(cli) -> None:
+    first = cli("invert", "--problem", "bar", "--iterations", "5", "--no-plot")
+    assert first.code == 0
+    assert "not converged after 5 iterations" in first.out
+    assert "adjoint" in first.out
+    again = cli("invert", "--problem", "bar", "--resume", "--json", "--tolerance", "1e-12")
+    steps = [row for row in again.rows if row["table"] == "inversion"]
+    assert steps[0]["iteration"] == 5
+    names, kept = Store("results/routes.sqlite").table("inversion")
+    assert steps[0]["objective"] == pytest.approx(kept[5][names.index("objective")], rel=1e-12)
+    last = [row for row in again.rows if row["table"] == "estimates"]
+    assert [row["blind"] for row in last] == [0] * 5 + [1] * 3
+    assert max(abs(row["estimate"] - row["truth"]) for row in last[:5]) < 1e-6
+
+
+def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
+    out = cli("invert", "--problem", "bar", "--route", "adjoint", "--route", "fd-central", "--no-store").out
+    for words in (
+        "to reach a misfit of",
+        "7 fwd + 7 adj",
+        "119 fwd",
+        "//////////// blind",
+        "forward solves",
+    ):
+        assert words in out
+    out = cli("invert", "--problem", "bar[noise=0.01]", "--alpha-sweep", "1e-5", "1e-1", "4", "--no-store").out
+    assert "L-curve" in out
+    assert "misfit / noise" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--iterations", "0"), "--iterations 0"),
+        (("--alpha-sweep", "1", "0.1", "3"), "0 < LEAST < MOST"),
+        (("--draws", "5"), "and --alpha-sweep"),
+        (("--draws", "5", "--alpha-sweep", "1e-3", "1", "3"), "without noise"),
+        (("--minibatch", "1"), "--optimizer adam"),
+        (("--minibatch", "1", "--optimizer", "adam"), "has no load cases"),
+        (("--positive", "log"), "a log field is positive already"),
+        (("--optimizer", "levenberg-marquardt"), "5 data for 8 parameters"),
+        (("--resume",), "no such file"),
+        (("--resume", "--no-store"), "there is none"),
+        (("--route", "adjoint", "--route", "tangent", "--alpha-sweep", "1e-3", "1", "3"), "name one"),
+    ],
+)
+def test_wrong_usage_is_one_line(cli, arguments: tuple[str, ...], says: str) -> None:
+    ran = cli("invert", "--problem", "bar", *arguments)
+    assert (ran.code, says in ran.err) == (2, True), ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_an_interrupt_keeps_what_was_found(tmp_path: Path) -> None:
+    command = [str(Path(sys.executable).with_name("routes")), "invert", "--problem", "bar[n=2000,sensors=2000]"]
+    child = subprocess.Popen(
+        [*command, "--optimizer", "descent", "--iterations", "1000000", "--tolerance", "0"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "100"},
+    )  # fmt: skip
+    for line in child.stdout:
+        if line.startswith("  20 "):
+            break
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert "Traceback" not in err
+    assert "to reach a misfit of" in out
+    names, rows = Store(tmp_path / "results" / "routes.sqlite").table("inversion")
+    assert len(rows) >= 20
+    assert rows[-1][names.index("says")].endswith("interrupted")
+
+
+def test_the_examples_of_the_help_run(cli) -> None:
+    from bench.commands.invert import invert as verb
+
+    lines = [line.strip() for line in verb.help.splitlines() if line.strip().startswith("routes invert --problem")]
+    assert len(lines) == 3
+    for line in lines:
+        arguments = shlex.split(re.split(r" {2,}", line)[0])[1:]
+        assert cli(*arguments, "--no-store", "--no-plot", "--iterations", "3").code == 0
