@@ -66,8 +66,8 @@ benchmark: $(READY) ## the bar over N and routes into results/, kernels, limits,
 	$(BIN)/python -m bench.studies.verdicts
 	$(BIN)/python -m bench.studies.confusion
 
-reports: $(READY) ## the tables of everything in results/
-	$(BIN)/routes report
+reports: $(READY) ## everything in results/ as one page, results/report.html
+	$(BIN)/routes report -o results/report.html
 
 clean: ## remove what was installed, built and cached; keep results/
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks

@@ -16,7 +16,8 @@ from bench.commands.compare import baseline, compare
 from bench.commands.identify import identify
 from bench.commands.invert import invert
 from bench.commands.kink import kink
-from bench.commands.run import run, show
+from bench.commands.report import report
+from bench.commands.run import run
 from bench.commands.scaling import scaling
 from bench.commands.shared import complain, debug_option, debugging, store_option
 from bench.commands.status import status
@@ -130,16 +131,7 @@ def export(table: str, format: str | None, output: Path | None, store: Path) -> 
     write(Store(store), table, format or (named if named in ("parquet", "json") else "csv"), output)
 
 
-@main.command()
-@store_option
-@debug_option
-def report(store: Path) -> None:
-    """The tables of everything the store holds."""
-    from bench.store import Store
-
-    show(Store(store).rows())
-
-
+main.add_command(report)
 main.add_command(tolerance)
 main.add_command(unrolling)
 main.add_command(scaling)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow"}
+HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "matplotlib"}
 FORBIDDEN = {"problems": {"routes", "bench"}, "routes": {"bench"}}
 FLOORS = ("problems", "routes", "bench")
 CONTRACT = {"problem", "errors", "chain", "sparse", "jax64"}  # what routes may know of floor 1: no single problem

@@ -36,7 +36,7 @@ def show(rows: Sequence[Row], plotted: bool = True, definite: bool = False) -> N
         out.print(curves(measured, out.width))
         out.print()
     if measured:
-        title = f"{tables.named('problem', rows[0])}, {rows[0]['linear_solver']}: {_axis(rows[0])}"
+        title = f"{tables.named('problem', rows[0])}, {rows[0]['linear_solver']}: {_axis(measured[0])}"
         out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)

@@ -1,0 +1,55 @@
+"""`routes report`: what the store holds, in the terminal, as a page, as Markdown, as figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bench.commands.shared import debug_option, store_option
+
+if TYPE_CHECKING:
+    from bench.store import Store
+
+OUTPUT = "File to write; its name says the format: report.html, report.md."
+FORMAT = "[that of FILE's name, else html]"
+FIGURES = "Folder for every figure as PNG, SVG and PDF; needs gradient-routes[pictures]."
+MORE = "routes report -o report.html: figures, curves and all studies, as one page"
+
+
+@click.command()
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE", help=OUTPUT)
+@click.option("--format", type=click.Choice(["html", "md"]), help=FORMAT)
+@click.option("--figures", type=click.Path(path_type=Path), metavar="DIR", help=FIGURES)
+@store_option
+@debug_option
+def report(output: Path | None, format: str | None, figures: Path | None, store: Path) -> None:
+    """Everything the store holds: the bill, curves and verdicts, studies, failures.
+
+    \b
+    routes report                                     tables in the terminal
+    routes report -o report.html                      one page that needs no server and no network
+    routes report --format md -o report.md --figures figures
+    """
+    from bench.store import Store
+
+    kept = Store(store)
+    if output is None and format is None and figures is None:
+        _print(kept)
+        return
+    from bench.report.writing import report as write
+
+    if output is not None and format is None:
+        format = "md" if output.suffix.lower() in (".md", ".markdown") else "html"
+    printed = format is not None and output in (None, Path("-"))
+    for line in write(kept, output, format, figures):
+        click.echo(line, err=printed)
+
+
+def _print(store: Store) -> None:
+    from bench.commands.run import show
+    from bench.views.tables import console
+
+    show(store.rows())
+    console().print(MORE, style="dim", soft_wrap=True)
