@@ -112,7 +112,7 @@ class Ungrateful(Block):
     structure, matrix_free = "general", False
 
 
-CASES: dict[str, Problem] = NONLINEAR | {"block[n=4]": Block(), "general": Ungrateful(n=3)}
+CASES: dict[str, Problem] = NONLINEAR | {"block[n=3]": Block(n=3), "general": Ungrateful(n=3)}
 
 
 @pytest.mark.parametrize("name", CASES)
