@@ -5,6 +5,7 @@ READY := .venv/ready
 GATE := results/gate.sqlite
 # small problems, not timed: counts, errors and verdicts are exact, and time is another gate's
 MATRIX := --problem bar --problem 'block[n=2]' --problem 'advection[n=4]' --route all --no-timing --jobs 2
+DEFAULT := --problem 'bar[n=8|100|1000|10000|100000|1000000]' --problem 'block[n=4|6|8]' --problem 'advection[n=8|16|32]'
 CHECKED := adjoint faulty-adjoint
 
 .DEFAULT_GOAL := help
@@ -58,13 +59,18 @@ benchmark-regression: $(READY) ## kernels and routes timed against tests/benchma
 benchmark-baseline: $(READY) ## tests/benchmarks/baseline.json anew: look at its diff
 	$(BIN)/python tests/benchmarks/gate.py --write
 
-benchmark: $(READY) ## the bar over N and routes into results/, kernels, limits, verdicts (minutes)
-	$(BIN)/routes run --problem 'bar[n=8|100|1000|10000|100000|1000000]' --route all
-	$(BIN)/python -m pytest tests/benchmarks/bench_*.py --benchmark-only --benchmark-columns=min,median,iqr,rounds
+benchmark: $(READY) ## the default matrix into results/, with resume, then scaling, limits, verdicts (an hour)
+	$(BIN)/routes run $(DEFAULT) --route all --resume
+	$(BIN)/routes scaling --problem bar --no-plot
+	$(BIN)/routes scaling --problem block --route tangent --route adjoint --route fd-central --growth 2 --no-plot
+	$(BIN)/routes scaling --problem advection --route tangent --route adjoint --no-plot
 	$(BIN)/python -m bench.studies.limits
 	$(BIN)/python -m bench.studies.block_limits
 	$(BIN)/python -m bench.studies.verdicts
 	$(BIN)/python -m bench.studies.confusion
+	$(BIN)/python -m bench.studies.harness
+	$(BIN)/python -m bench.studies.repeat
+	$(BIN)/python -m bench.studies.reporting
 
 reports: $(READY) ## everything in results/ as one page, results/report.html
 	$(BIN)/routes report -o results/report.html
