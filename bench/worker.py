@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 import time
@@ -98,6 +99,9 @@ def main(descriptor: int) -> None:
     """Submit to limits, do one job."""
     os.set_inheritable(descriptor, False)  # what a case starts must not hold the line open
     os.dup2(2, 1)  # stdout belongs to results, whoever writes to it
+    assert isinstance(sys.stderr, io.TextIOWrapper)
+    sys.stderr.reconfigure(write_through=True)  # what is printed before a crash is not lost
+    sys.stdout = sys.stderr
     connection = Connection(descriptor)
     limits, parent, sys.path[:] = connection.recv()
     submit_to(limits, parent)

@@ -6,19 +6,27 @@ from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
 
-from bench.executors.isolated import whole
+from bench.executors.isolated import Isolated, finished
 from bench.isolation.limits import Limits
 from bench.outcome import Outcome
 from bench.worker import Measure
 
 
 def outcomes(jobs: Iterator[Measure], slots: int, limits: Limits) -> Iterator[Outcome]:
-    """As they come; a job is taken when a process is free for it."""
+    """As they come; a job is taken when a process is free for it. Closed early, it ends those that run."""
+    running: dict[Future[Outcome], Isolated] = {}
     with ThreadPoolExecutor(slots) as threads:
-        running: set[Future[Outcome]] = set()
-        while True:
-            running |= {threads.submit(whole, job, limits) for job in islice(jobs, slots - len(running))}
-            if not running:
-                return
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            yield from (future.result() for future in done)
+        try:
+            while True:
+                for job in islice(jobs, slots - len(running)):
+                    case = Isolated(job, limits)
+                    running[threads.submit(finished, case)] = case
+                if not running:
+                    return
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    del running[future]
+                yield from (future.result() for future in done)
+        finally:
+            for case in running.values():
+                case.close()

@@ -19,9 +19,13 @@ from bench.isolation.limits import Limits
 from bench.units import size
 
 TICK = 0.1  # [s] between two looks at its memory
-KEPT = 4000  # characters of stderr
+GRACE = 5.0  # [s] for the end of what has hung up
+KEPT = 8000  # bytes of stderr
 LAST = 20  # lines of it
-EXHAUSTED = ("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory")
+EXHAUSTED = (
+    *("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory"),
+    "Memory allocation still failed",  # OpenBLAS
+)
 
 
 class Killed(Exception):
@@ -43,7 +47,8 @@ class Ending:
 class Confined:
     """`python -P -m MODULE ARGUMENTS` under limits.
 
-    watch(limits, until) waits; kill() ends it and everything it started; stderr is its last lines.
+    watch(until, deadline) waits; kill() ends it and everything it started; stderr is its last lines. Out of reach is
+    what has left its process group and lost its parent, too: a daemon.
     """
 
     def __init__(
@@ -53,7 +58,7 @@ class Confined:
         self._oom_kills = _oom_kills()
         self._talkative, self._stderr = talkative, bytearray()
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", module, *arguments],
+            [sys.executable, "-P", "-X", "faulthandler", "-m", module, *arguments],
             env={**os.environ, **limits.environment},
             stderr=subprocess.PIPE,
             start_new_session=True,
@@ -100,8 +105,11 @@ class Confined:
 
     def ending(self) -> Ending:
         """What became of a process that is ending without having said why: its exit code or signal, read."""
-        code = self.process.wait()
+        ended = self.ended(GRACE)
         self.kill()  # what it started may still run
+        if not ended:
+            return Ending("crashed", f"it hung up and was still running {GRACE:g} s later")
+        code = self.process.wait()
         if any(word in self.stderr for word in EXHAUSTED):
             cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
             return Ending("out-of-memory", f"an allocation failed within --memory{cap}: {self._last_line()}")
@@ -125,8 +133,9 @@ class Confined:
             while piece := os.read(stream.fileno(), 65536):
                 self._stderr = (self._stderr + piece)[-KEPT:]
                 if self._talkative:
-                    sys.stderr.write(piece.decode(errors="backslashreplace"))
-                    sys.stderr.flush()
+                    with suppress(OSError, ValueError):  # nobody listens: it must go on being read all the same
+                        sys.stderr.write(piece.decode(errors="backslashreplace"))
+                        sys.stderr.flush()
 
     def _descendants(self) -> list[psutil.Process]:
         try:
