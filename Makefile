@@ -30,13 +30,14 @@ lint: $(READY) ## style: ruff
 type: $(READY) ## types: mypy
 	$(BIN)/mypy
 
-benchmark: $(READY) ## the bar over N and routes into results/, kernels, limits, verdicts (minutes)
+benchmark: $(READY) ## the bar over N and routes into results/, kernels, limits, verdicts, kills (minutes)
 	$(BIN)/routes run --problem 'bar[n=8|100|1000|10000|100000|1000000]' --route all
 	$(BIN)/python -m pytest tests/benchmarks/bench_*.py --benchmark-only --benchmark-columns=min,median,iqr,rounds
 	$(BIN)/python -m bench.studies.limits
 	$(BIN)/python -m bench.studies.block_limits
 	$(BIN)/python -m bench.studies.verdicts
 	$(BIN)/python -m bench.studies.confusion
+	$(BIN)/python -m bench.studies.killing
 
 reports: $(READY) ## the tables of everything in results/
 	$(BIN)/routes report

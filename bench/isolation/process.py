@@ -20,7 +20,7 @@ from bench.units import size
 
 TICK = 0.1  # [s] between two looks at its memory
 GRACE = 5.0  # [s] for the end of what has hung up
-KEPT = 8000  # bytes of stderr
+KEPT = 4000  # bytes of stderr
 LAST = 20  # lines of it
 EXHAUSTED = (
     *("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory"),
@@ -58,7 +58,7 @@ class Confined:
         self._oom_kills = _oom_kills()
         self._talkative, self._stderr = talkative, bytearray()
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-X", "faulthandler", "-m", module, *arguments],
+            [sys.executable, "-P", "-m", module, *arguments],
             env={**os.environ, **limits.environment},
             stderr=subprocess.PIPE,
             start_new_session=True,
@@ -110,7 +110,7 @@ class Confined:
         if not ended:
             return Ending("crashed", f"it hung up and was still running {GRACE:g} s later")
         code = self.process.wait()
-        if any(word in self.stderr for word in EXHAUSTED):
+        if any(word.encode() in self._stderr for word in EXHAUSTED):
             cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
             return Ending("out-of-memory", f"an allocation failed within --memory{cap}: {self._last_line()}")
         if code >= 0:
@@ -129,7 +129,7 @@ class Confined:
         return next((line.strip() for line in reversed(self.stderr.splitlines()) if line.strip()), "")
 
     def _listen(self, stream: IO[bytes]) -> None:
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError), stream:
             while piece := os.read(stream.fileno(), 65536):
                 self._stderr = (self._stderr + piece)[-KEPT:]
                 if self._talkative:

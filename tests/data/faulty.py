@@ -1,35 +1,44 @@
-"""Problems, routes and models whose code does what none should: what tests of isolation run."""
+"""Problems, routes and objects for `routes check` whose code does what none should: what tests of isolation run."""
 
 from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
-from problems.problem import Array, Offers, Parameters, Problem
-from routes.model import Model as Solved
+from problems.problem import Array, Offers, Parameters, Problem, Reference
+from routes.model import Model
 from routes.route import Result, Work, route
 
 C = ctypes.CDLL(None)
 C.malloc.restype = ctypes.c_void_p
-SLEEPS = "import time; time.sleep(987)"
-TAKES = "import sys\nheld = []\nwhile True: held.append(bytearray(b'x' * 10**7))"
+SLEEPS = [sys.executable, "-c", "import time; time.sleep(987)"]
+TAKES = [sys.executable, "-c", "held = []\nwhile True: held.append(bytearray(b'x' * 10**7))"]
+MEGABYTE = 10**6
 
 
 class Faulty(Problem):
-    """J = |p|^2 / 2; call number `when` of it does something else first, or building where that is 0."""
+    """J = |p|^2 / 2; call number `when` of it does something else first, its building where that is 0.
+
+    taken      megabytes of p's at n = 1, all the more at n
+    reference  p, or half of it
+    """
 
     name = "faulty"
     offers = Offers.VALUE
 
-    def __init__(self, *, n: int = 2, does: str = "nothing", when: int = 1) -> None:
-        self.does, self.when, self.calls = does, when, 0
+    def __init__(
+        self, *, n: int = 2, does: str = "nothing", when: int = 1, taken: float = 0.0, halved: bool = False
+    ) -> None:
+        self.does, self.when, self.taken, self.halved, self.calls = does, when, taken, halved, 0
         self.parameters = Parameters(start=np.ones(n), scale=np.ones(n))
         if when == 0:
             MISDEEDS[does]()
@@ -38,51 +47,61 @@ class Faulty(Problem):
         self.calls += 1
         if self.calls == self.when:
             MISDEEDS[self.does]()
+        _ = np.ones(int(len(p) * self.taken * MEGABYTE / 8))
         return float("nan") if self.does == "nan" else 0.5 * float(p @ p)
 
-    def reference(self, p: Array):
-        from problems.problem import Reference
-
-        return Reference("closed form", p.copy(), 1.0)
+    def reference(self, p: Array) -> Reference:
+        return Reference("p", 0.5 * p if self.halved else p.copy(), 1.0)
 
 
 @route("itself", needs=Offers.VALUE, cost=lambda n_p, forward, **options: Work())
-def itself(model: Solved, p: Array) -> Result:
-    """The gradient p."""
+def itself(model: Model, p: Array) -> Result:
+    """p."""
     return Result(0.5 * float(p @ p), p.copy())
 
 
-@route("wrong-then-hangs", needs=Offers.VALUE, cost=lambda n_p, forward, **options: Work())
-def wrong_then_hangs(model: Solved, p: Array) -> Result:
-    """Twice the gradient, and no end where it is called again."""
-    if os.environ.get("CALLED"):
-        hang()
-    os.environ["CALLED"] = "1"
-    return Result(None, 2.0 * p)
+@route("never-timed", needs=Offers.VALUE, cost=lambda n_p, forward, **options: Work())
+def never_timed(model: Model, p: Array) -> Result:
+    """p, twice; the third call ends the process."""
+    model.calls = vars(model).get("calls", 0) + 1
+    if model.calls > 2:
+        os._exit(3)
+    return itself.function(model, p)
 
 
-class Hanging:
+class Sound:
     """For `routes check`."""
 
     start = np.ones(2)
+    does = "nothing"
 
     def objective(self, p: Array) -> float:
-        return sleeping()
+        MISDEEDS[self.does]()
+        return 0.5 * float(p @ p)
 
     def gradient(self, p: Array) -> Array:
         return p
 
 
-class Leaving(Hanging):
-    """Ends the process as if all were well."""
-
-    def objective(self, p: Array) -> float:
-        os._exit(0)
+class Sleeping(Sound):
+    does = "sleep"
 
 
-def sleeping() -> None:
+class Stubborn(Sound):
+    does = "stubborn"
+
+
+class Leaving(Sound):
+    does = "leave"
+
+
+class Chatty(Sound):
+    does = "garbage"
+
+
+def sleep() -> None:
     """Waits for a child that does not end."""
-    subprocess.Popen([sys.executable, "-c", SLEEPS]).wait()
+    subprocess.Popen(SLEEPS).wait()
 
 
 def hang() -> None:
@@ -90,33 +109,39 @@ def hang() -> None:
     ctypes.PyDLL(None).sleep(987)
 
 
-def spin() -> None:
-    while True:
-        pass
-
-
 def stubborn() -> None:
+    """Neither an interrupt nor a request to terminate is heard."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    spin()
+    sleep()
 
 
-def escaping() -> None:
-    """Its child leaves the process group."""
-    subprocess.Popen([sys.executable, "-c", SLEEPS], start_new_session=True).wait()
+def escape() -> None:
+    """The child leaves the process group."""
+    subprocess.Popen(SLEEPS, start_new_session=True).wait()
 
 
-def leaving_children() -> None:
-    """Goes on while they run."""
-    subprocess.Popen([sys.executable, "-c", SLEEPS])
+def abandon() -> None:
+    """Goes on while its children run, one by exec and one by fork."""
+    subprocess.Popen(SLEEPS)
     if os.fork() == 0:
         time.sleep(987)
+
+
+def daemonize() -> None:
+    """The child of a child that has ended, in a session of its own: nobody's any more."""
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            time.sleep(987)
+        os._exit(0)
+    os.wait()
 
 
 def take() -> None:
     held = []
     while True:
-        held.append(np.ones(10**6))
+        held.append(np.ones(MEGABYTE))
 
 
 def take_by_jax() -> None:
@@ -126,17 +151,31 @@ def take_by_jax() -> None:
 
 
 def take_in_c() -> None:
-    """As C++ does: an allocation that fails ends it, the address 0 being written to."""
-    while True:
-        ctypes.memset(C.malloc(ctypes.c_size_t(10**6)) or 0, 1, 10**6)
+    """Until there is no more; it says so as C programs do."""
+    while block := C.malloc(ctypes.c_size_t(MEGABYTE)):
+        ctypes.memset(block, 1, MEGABYTE)
+    C.perror(b"malloc")
+    os.abort()
 
 
 def take_by_child() -> None:
-    subprocess.run([sys.executable, "-c", TAKES], preexec_fn=uncapped, check=False)
+    subprocess.run(TAKES, check=False)
 
 
-def uncapped() -> None:
-    """Nothing that a process does to itself may lift the cap."""
+def factorize() -> None:
+    """With next to no memory left, a matrix that is positive definite."""
+    from problems.sparse import SymmetricPattern
+    from routes.factorization import Factorizer
+
+    n = 22
+    nodes, one, other = np.arange(n**3).reshape(n, n, n), range(n - 1), range(1, n)
+    edges = [np.stack([nodes.take(one, axis).ravel(), nodes.take(other, axis).ravel()], 1) for axis in range(3)]
+    pattern = SymmetricPattern.of_elements(np.concatenate(edges), n**3)
+    A = pattern.assemble(np.tile([1.1, -1.0, 1.1], (3 * len(edges[0]), 1)))
+    with open("/proc/self/status") as file:
+        most = next(1024 * int(line.split()[1]) for line in file if line.startswith("VmData")) + 12 * MEGABYTE
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+    Factorizer("pardiso")(A, "faulty")
 
 
 def garbage() -> None:
@@ -144,35 +183,82 @@ def garbage() -> None:
     C.printf(b"garbage of C\n")
     os.write(1, b"\x00\xff garbage of the system\n")
     print("garbage of Python")
-    sys.stderr.write("\x1b[31mred")
+    sys.stderr.write("\x1b[31mgarbage without an end")
 
 
 def flood() -> None:
     for _ in range(100):
-        os.write(2, b"x" * 10**6)
+        os.write(2, b"x" * MEGABYTE)
     os.write(2, b"\nthe end\n")
 
 
-def closing() -> None:
-    """All it has open, its line to the runner, too."""
+def close() -> None:
+    """All that is open, the line to the runner, too."""
     os.closerange(3, 256)
 
 
-def closing_and_hanging() -> None:
-    closing()
+def hang_up() -> None:
+    close()
     hang()
 
 
-def scribbling() -> None:
-    """Into all it has open, the line to the runner among them: the head of a message that never comes."""
+def scribble() -> None:
+    """Into all that is open, the line to the runner, too: the head of a long message that never comes."""
     for descriptor in range(3, 64):
-        try:
+        with suppress(OSError):
             os.write(descriptor, b"\x00\xff\xff\xff")
-        except OSError:
-            continue
     hang()
 
 
+def fingers() -> None:
+    """Where it may run."""
+    print("processors", sorted(os.sched_getaffinity(0)))
+
+
+def busy(call: Callable[[], object]) -> None:
+    """What of the work of a while the busiest thread has done."""
+
+    def spent() -> dict[str, float]:
+        ticks = {}
+        for thread in os.listdir("/proc/self/task"):
+            with open(f"/proc/self/task/{thread}/stat") as file:
+                fields = file.read().rpartition(")")[2].split()
+            ticks[thread] = float(fields[11]) + float(fields[12])
+        return ticks
+
+    call()
+    before, start = spent(), time.process_time()
+    while time.process_time() < start + 0.3:
+        call()
+    worked = [ticks - before.get(thread, 0.0) for thread, ticks in spent().items()]
+    print("busiest", max(worked) / sum(worked))
+
+
+def by_blas() -> None:
+    A = np.ones((600, 600))
+    busy(lambda: A @ A)
+
+
+def by_xla() -> None:
+    import jax
+    import jax.numpy as jnp
+
+    A, product = jnp.ones((600, 600)), jax.jit(lambda A: jnp.sin(A @ A).sum())
+    busy(lambda: product(A).block_until_ready())
+
+
+def by_pardiso() -> None:
+    import scipy.sparse as sp
+    from pymklpardiso import PardisoSolver
+
+    A = sp.csr_array(sp.triu(sp.diags_array([-1.0, 4.0, -1.0], offsets=[-90, 0, 90], shape=(8000, 8000))))
+    busy(lambda: PardisoSolver(A, 2, {}))
+
+
+NAMED = (
+    *(sleep, hang, stubborn, escape, abandon, daemonize, take, take_by_jax, take_in_c, take_by_child, factorize),
+    *(garbage, flood, close, hang_up, scribble, fingers, by_blas, by_xla, by_pardiso),
+)
 MISDEEDS: dict[str, Callable[[], object]] = {
     "nothing": lambda: None,
     "nan": lambda: None,
@@ -183,14 +269,5 @@ MISDEEDS: dict[str, Callable[[], object]] = {
     "segfault": lambda: ctypes.string_at(0),
     "abort": os.abort,
     "kill": lambda: os.kill(os.getpid(), signal.SIGKILL),
-    "memory": lambda: np.ones(10**12),
-    "sleep": sleeping,
-    **{
-        f.__name__: f
-        for f in (
-            *(hang, spin, stubborn, escaping, leaving_children),
-            *(take, take_by_jax, take_in_c, take_by_child),
-            *(garbage, flood, closing, closing_and_hanging, scribbling),
-        )
-    },
+    **{function.__name__: function for function in NAMED},
 }
