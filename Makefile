@@ -71,6 +71,7 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m bench.studies.harness
 	$(BIN)/python -m bench.studies.repeat
 	$(BIN)/python -m bench.studies.reporting
+	$(BIN)/python -m bench.studies.killing
 
 reports: $(READY) ## everything in results/ as one page, results/report.html
 	$(BIN)/routes report -o results/report.html

@@ -16,6 +16,7 @@ from bench.commands.compare import baseline, compare
 from bench.commands.identify import identify
 from bench.commands.invert import invert
 from bench.commands.kink import kink
+from bench.commands.limited import INSIDE
 from bench.commands.report import report
 from bench.commands.run import run
 from bench.commands.scaling import scaling
@@ -31,7 +32,10 @@ KEEPING = ("run", "tolerance", "scaling", "invert")  # verbs that an interrupt d
 
 
 class Routes(click.Group):
-    """Turns errors into one line and an exit code; --debug lets the traceback through."""
+    """Turns errors into one line and an exit code; --debug lets the traceback through.
+
+    A verb ends with an exit code by click's Exit: a SystemExit is of the code that it runs.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         mend_streams()
@@ -51,13 +55,22 @@ class Routes(click.Group):
             hint = " ".join(map(str, interrupt.args))
             complain(f"interrupted - {what if ctx.invoked_subcommand in KEEPING else 'nothing is kept'}{hint}")
             leave(INTERRUPTED)
-        except BrokenPipeError:
-            raise  # click ends quietly: whoever read has read enough
+        except (BrokenPipeError, click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
+            raise  # click ends, quietly where whoever read has read enough
         except OSError as error:
             if debugging():
                 traceback.print_exc()
             complain(f"{error.strerror or error} - check where the output goes")
             ctx.exit(WRONG_USAGE)
+        except (Exception, SystemExit) as failure:  # what code of others may leave by
+            from bench.outcome import one_line, status_of
+
+            if debugging():
+                traceback.print_exc()
+            if ctx.obj == INSIDE and status_of(failure) == "out-of-memory":
+                raise  # the process that watches this one says and keeps it
+            complain(f"{ctx.invoked_subcommand}: {one_line(failure)} - see --debug")
+            ctx.exit(FAILED)
 
 
 def leave(code: int) -> NoReturn:

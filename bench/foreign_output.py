@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -23,5 +24,7 @@ def stdout_to_stderr() -> Iterator[None]:
         with redirect_stdout(sys.stderr):
             yield
     finally:
+        if os.name == "posix":
+            ctypes.CDLL(None).fflush(None)  # what C holds back would be written later
         os.dup2(kept, 1)
         os.close(kept)

@@ -24,7 +24,8 @@ def write(path: Path, views: Sequence[tuple[Row, View]]) -> None:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["problem", "route", "parameter", "unit", *AXES[:d], "p", "dJ_dp", "reference"])
         for row, view in views:
-            out.writerows([named("problem", row), named("route", row), *line] for line in _lines(view, d))
+            names = [named("problem", row), named("route", row)]
+            out.writerows([*names, *line] for line in _lines(view, d))
 
 
 def _lines(view: View, d: int) -> Iterator[list[Any]]:

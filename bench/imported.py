@@ -57,7 +57,7 @@ def _of_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses and pickles look themselves up there
     if str(path.parent) not in sys.path:
-        sys.path.insert(0, str(path.parent))  # what stands beside the file can be imported by it
+        sys.path.append(str(path.parent))  # what stands beside the file can be imported by it, and hides nothing
     try:
         spec.loader.exec_module(module)
     except BaseException:

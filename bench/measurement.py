@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import socket
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from statistics import median
 from typing import Any
@@ -16,6 +15,7 @@ from bench.accuracy import Judge, norm2
 from bench.bill import summary
 from bench.case import ProblemSpec, RouteSpec
 from bench.environment import environment
+from bench.foreign_output import stdout_to_stderr
 from bench.memory import peak_of
 from bench.outcome import FOREIGN, Failure, NonFinite, Outcome, failed, note
 from bench.rows import Row, empty_row
@@ -147,7 +147,7 @@ class Measurement:
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Every number that is kept is checked to be finite; stdout belongs to the results."""
-    with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
+    with np.errstate(all="ignore"), stdout_to_stderr():
         yield
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -55,7 +55,7 @@ def run(
     settings: Settings,
     how: How = HERE,
     wanted: Callable[[Row], bool] = everything,
-) -> Iterator[Outcome]:
+) -> Generator[Outcome]:
     """All pairs that are wanted, problem by problem; each outcome as soon as it is known.
 
     InputError and DomainError for problems that cannot be come before anything is measured.
@@ -83,7 +83,7 @@ class Sweep:
         self._places = itertools.count()
         self._started: dict[str, tuple[int, Measure, Size | None]] = {}
 
-    def outcomes(self) -> Iterator[Outcome]:
+    def outcomes(self) -> Generator[Outcome]:
         """Raises the refusal of a case that is refused before any other has an outcome."""
         begun = False
         for outcome in self._outcomes():

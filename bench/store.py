@@ -23,7 +23,7 @@ from bench.units import now
 from problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
-SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: inversion, identifiability
+SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: scaling, inversion, identifiability
 PATIENCE = 60.0  # [s] to wait for another writer
 TABLES: dict[str, tuple[Column, ...]] = {
     "cases": (KEYS[0], KEYS[1], *STORED),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bench.case import ProblemSpec, sized
 from bench.executors.isolated import Line
+from bench.foreign_output import stdout_to_stderr
 from bench.isolation.limits import Limits
 from bench.isolation.process import Killed
 from bench.outcome import FOREIGN
@@ -35,7 +36,8 @@ def sizes(problems: list[ProblemSpec], settings: Settings, limits: Limits | None
 def surveyed(problem: ProblemSpec, at: str) -> Size | RoutesError | None:
     """The size of one problem, the error of one that refuses what it is given, None for one that fails."""
     try:
-        return sized(problem, at)
+        with stdout_to_stderr():
+            return sized(problem, at)
     except (InputError, DomainError) as error:
         return error
     except FOREIGN:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -112,7 +114,12 @@ def main(descriptor: int) -> None:
     os.set_inheritable(descriptor, False)  # what a case starts must not hold the line open
     told()
     os.dup2(2, 1)  # stdout belongs to results, whoever writes to it
+    assert isinstance(sys.stderr, io.TextIOWrapper)
+    sys.stderr.reconfigure(write_through=True)  # what is printed before a crash is not lost
+    sys.stdout = sys.stderr
     connection = Connection(descriptor)
+    for ours in ("problems", "routes"):
+        import_module(ours)  # before what lies beside a user's file can be taken for them
     limits, parent, sys.path[:] = connection.recv()
     submit_to(limits, parent)
     job: Job = connection.recv()

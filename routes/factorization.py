@@ -151,6 +151,8 @@ class SparseFactorization:
         try:
             self.lu: Any = splu(A.tocsc())
         except RuntimeError as error:
+            if "SUPERLU_MALLOC" in str(error):
+                raise MemoryError(f"factors of R_u ({A.shape[0]} unknowns): {error}") from error
             raise SingularMatrix(f"{who}: R_u ({A.shape[0]} unknowns): {error} - check p and the supports") from error
 
         self.norm = float(abs(A).sum(axis=1).max())

@@ -27,6 +27,7 @@ ORDERING, PIVOT_EPS, SCALING, TRANSPOSED, MATCHING, PERTURBED, ANALYSIS_KB, FACT
 SETTINGS = {ORDERING: 2, PIVOT_EPS: 12}
 UNSYMMETRIC = {SCALING: 1, MATCHING: 1}
 REGULAR = 1e-2  # error of a solution that was known before; a regular matrix leaves eps times its condition number
+EXHAUSTED = "not enough memory"  # what PARDISO says
 IDLE = 6  # two for each of three load cases: analyses kept for reuse, a pattern and kind
 
 Idle = dict[tuple[int, bool], list[Any]]
@@ -65,12 +66,14 @@ class PardisoFactorization:
         return np.asarray(solver.solve(np.ascontiguousarray(b, dtype=dtype)))
 
     def _factorized(self, A: Any, transposed: bool) -> Any:
-        """A PARDISO that holds factors of A; raises SingularMatrix."""
+        """A PARDISO that holds factors of A; raises SingularMatrix, MemoryError."""
         waiting = self._idle.setdefault((self._mtype, transposed), [])
         solver = _refactored(waiting.pop(), A) if waiting else None
         try:
             solver = solver or self._analyzed(A, transposed)
         except RuntimeError as error:
+            if EXHAUSTED in str(error):
+                raise MemoryError(f"factors of R_u ({A.shape[0]} unknowns): {error}") from error
             raise self._refusal(A, str(error)) from error
         missed = solution_error(A.T if transposed else A, lambda b: self._substitute(solver, b))
         if not missed < REGULAR:  # a singular L L^T may go unnoticed

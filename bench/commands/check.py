@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,7 +84,7 @@ def check(
         refuse_given(SOLVER, "is for registered problems")
     if (problem is None) != (route is None):
         refuse_given(UNUSED, "is for verdicts, a contract has none")
-        sys.exit(_contract(problem, route, at, solver, as_json))
+        raise click.exceptions.Exit(_contract(problem, route, at, solver, as_json))
     plan = Plan(budget=budget, seed=seed)
     accepted(accept)
     subject = _subject(target, objective, gradient, problem, route, at, solver)
@@ -94,7 +93,8 @@ def check(
     with stdout_to_stderr():
         found = check_subject(subject, plan, accept)
     named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
-    sys.exit(conclude(found, named, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept))
+    code = conclude(found, named, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept)
+    raise click.exceptions.Exit(code)
 
 
 def _subject(

@@ -66,7 +66,7 @@ def compare(
         check_writable("-o", output, [base, new, expected or new.parent / expectations.FILE])
     found = compare_sides(*sides, known, factor, subset)
     _write(found, format or _format_of(output), output)
-    sys.exit(1 if found.worse else 0)
+    raise click.exceptions.Exit(1 if found.worse else 0)
 
 
 def _format_of(output: Path | None) -> str:

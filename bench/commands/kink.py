@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -100,7 +99,7 @@ def kink(
     if failure is not None:
         complain(f"kink: what the stop's law costs is not known: {failure}")
     if swept.failed or failure is not None:
-        sys.exit(1)
+        raise click.exceptions.Exit(1)
 
 
 def _traded(swept: Kink, specs: list[RouteSpec], budget: float) -> Trade | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from functools import wraps
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from problems.errors import InputError
 
 if TYPE_CHECKING:
     from bench.isolation.limits import Limits
+    from bench.isolation.process import Confined
 
 FAILED, INTERRUPTED = 1, 130
 GRACE = 5.0  # [s] between an interrupt and the end of what does not react to it
@@ -76,7 +77,7 @@ def confined(timeout: float = 3600.0) -> Callable[[Command], Command]:
         def apart(*, isolate: bool, limits: Limits, **others: Any) -> Any:
             context = click.get_current_context()
             if isolate and context.find_root().obj != INSIDE:
-                sys.exit(_watched(context.info_name or "", limits, others.get("kept")))
+                raise click.exceptions.Exit(_watched(context.info_name or "", limits, others.get("kept")))
             if not isolate:
                 pin(limits)
             return command(**others)
@@ -87,51 +88,72 @@ def confined(timeout: float = 3600.0) -> Callable[[Command], Command]:
 
 
 def pin(limits: Limits) -> None:
-    """Threads and processors of this very process."""
+    """Threads and processors of this very process: by variables where libraries are yet to be loaded."""
+    os.environ.update(limits.environment)
     if "numpy" in sys.modules:
         from threadpoolctl import threadpool_limits
 
         threadpool_limits(limits.threads)
-    else:
-        os.environ.update(limits.environment)
     if limits.affinity is not None:
         os.sched_setaffinity(0, limits.affinity)
 
 
 def _watched(verb: str, limits: Limits, kept: Any) -> int:
     """Its exit code. A limit is said in a line and kept as a study that came to nothing."""
+    from bench.isolation.command import ENDED
     from bench.isolation.process import Confined, Killed
 
     given = json.dumps(asdict(limits) | {"timeout": None})
-    arguments = [given, str(os.getpid()), *sys.argv[1:]]
-    process = Confined("bench.isolation.command", arguments, limits, talkative=True)
-    deadline = time.monotonic() + limits.timeout
+    reader, writer = os.pipe()
+    arguments = [given, str(os.getpid()), str(writer), *sys.argv[1:]]
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what was started ends, too
+    process = Confined("bench.isolation.command", arguments, limits, talkative=True, pass_fds=[writer])
+    os.close(writer)
     try:
-        process.watch(process.ended, deadline)
+        process.watch(process.ended, time.monotonic() + limits.timeout)
     except Killed as limit:
-        complain(f"{verb}: {limit.status} {limit.reason} - raise the limit, or ask for less")
-        _keep(kept, verb, limit.status, limit.reason, process.stderr)
-        return FAILED
+        return _ended(verb, limit.status, limit.reason, "raise the limit, or ask for less", process, kept)
     except KeyboardInterrupt:
         return _interrupted(process)
     code = process.process.wait()
-    if code < 0 or code > 130:
-        ending = process.ending()
-        complain(f"{verb}: {ending.status}: {ending.reason} - see what it says above")
-        _keep(kept, verb, ending.status, ending.reason, process.stderr)
-        return FAILED
-    process.kill()
-    return code
+    process.kill()  # what it has left behind
+    word = _word(reader)
+    if word == ENDED:
+        return code
+    if word:
+        return _ended(verb, "out-of-memory", word, "raise --memory, or ask for less", process, kept)
+    ending = process.ending()
+    return _ended(verb, ending.status, ending.reason, "see what it says above", process, kept)
 
 
-def _interrupted(process: Any) -> int:
-    """The verb may still print and keep what it has."""
-    process.process.send_signal(signal.SIGINT)
+def _word(reader: int) -> str:
+    """What has been said on a line, which processes that are out of reach may still hold open."""
+    os.set_blocking(reader, False)
     try:
+        return os.read(reader, 10_000).decode(errors="replace")
+    except BlockingIOError:
+        return ""
+    finally:
+        os.close(reader)
+
+
+def _ended(verb: str, status: str, reason: str, todo: str, process: Confined, kept: Any) -> int:
+    """Say and keep why a verb has come to nothing."""
+    complain(f"{verb}: {status}: {reason} - {todo}")
+    _keep(kept, verb, status, reason, process.stderr)
+    return FAILED
+
+
+def _interrupted(process: Confined) -> int:
+    """The verb may still print and keep what it has."""
+    from bench.isolation.process import Killed
+
+    process.process.send_signal(signal.SIGINT)
+    with suppress(Killed, KeyboardInterrupt):  # its time is over, or the user's patience
         process.watch(process.ended, time.monotonic() + GRACE)
-    except BaseException:  # its time is over, or the user's patience
-        process.kill()
     process.kill()
+    if process.process.returncode != INTERRUPTED:
+        complain("interrupted - nothing is kept")
     return INTERRUPTED
 
 
@@ -143,7 +165,3 @@ def _keep(kept: Any, verb: str, status: str, reason: str, stderr: str) -> None:
             Store(kept).append_ended(verb, status, reason, stderr)
         except InputError as error:
             complain(f"not kept: {error}")
-
-
-def finite(seconds: float) -> float | None:
-    return seconds if math.isfinite(seconds) else None

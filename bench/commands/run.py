@@ -6,6 +6,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -127,8 +128,9 @@ def run(
     done = Done(store, as_json, known, views=gradient is not None or vtu is not None)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
     try:
-        for outcome in with_progress(outcomes, count):
-            done.take(outcome)
+        with closing(outcomes):  # whatever interrupts, cases under way are ended first
+            for outcome in with_progress(outcomes, count):
+                done.take(outcome)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
     finally:  # an interrupt leaves what was measured on the screen, too
@@ -145,7 +147,7 @@ def run(
     if debugging():
         click.echo("".join(outcome.row["traceback"] or "" for outcome in done.outcomes), err=True, nl=False)
     if done.failures:
-        sys.exit(1)
+        raise click.exceptions.Exit(1)
 
 
 class Done:

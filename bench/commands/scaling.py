@@ -121,7 +121,7 @@ def scaling(
     if done.interrupted:
         raise KeyboardInterrupt
     if not any(row["status"] == "ok" for row in done.rows):
-        sys.exit(1)
+        raise click.exceptions.Exit(1)
 
 
 def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], settings: Settings) -> Found:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -86,7 +85,8 @@ def vcurve(
     with stdout_to_stderr():
         found = check(looked_at, plan)
     what = {"problem": problem, "route": route, "at": at}
-    sys.exit(conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept))
+    code = conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept)
+    raise click.exceptions.Exit(code)
 
 
 def _default(problem: Problem) -> int | tuple[int, ...]:

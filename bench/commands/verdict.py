@@ -40,7 +40,7 @@ def built(spec: ProblemSpec, at: str) -> tuple[Problem, Array]:
     try:
         with stdout_to_stderr():
             problem = spec()
-    except RoutesError:
+    except (RoutesError, MemoryError):
         raise
     except FOREIGN as error:
         said = " ".join(str(error).split())

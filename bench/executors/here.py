@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from bench.executors.running import interleaved
+from bench.foreign_output import stdout_to_stderr
 from bench.measurement import Measurement, measure
 from bench.outcome import FOREIGN, Outcome, refused, unbuilt
 from bench.workbench import Workbench
@@ -48,7 +49,8 @@ def outcomes(jobs: list[Measure]) -> Iterator[Outcome]:
     first = jobs[0]
     settle()
     try:
-        bench = Workbench(first.problem, first.settings, first.found)
+        with stdout_to_stderr():
+            bench = Workbench(first.problem, first.settings, first.found)
     except (InputError, DomainError) as error:
         yield from (refused(job.row, error) for job in jobs)
     except FOREIGN as failure:

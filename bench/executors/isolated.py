@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from bench.accuracy import Found
@@ -28,7 +30,7 @@ Case = Measure | Sealed
 
 
 class Line:
-    """A confined worker doing a job, and the messages it sends."""
+    """A confined worker doing a job, and the messages it sends, read beside: half a message must stop nobody."""
 
     def __init__(self, job: Job, limits: Limits, cwd: str | None = None) -> None:
         self._left = limits.timeout
@@ -45,20 +47,39 @@ class Line:
         with suppress(OSError):  # it is gone: hearing will tell
             self.connection.send((limits, os.getpid(), sys.path))
             self.connection.send(job)
+        self._heard: SimpleQueue[Any] = SimpleQueue()
+        self._message: Any = None
+        threading.Thread(target=self._listen, daemon=True).start()
 
     def hear(self) -> tuple[str, Any]:
         """Its next message. Raises Killed at a limit, EOFError where it has ended, with no word or a broken one."""
         start = time.monotonic()
         try:
-            self.process.watch(self.connection.poll, start + self._left)
-            kind, what = self.connection.recv()
-        except (EOFError, Killed):
-            raise
-        except Exception as broken:  # half a message, or one that cannot be read here
-            raise EOFError from broken
+            self.process.watch(self._came, start + self._left)
         finally:
             self._left -= time.monotonic() - start
+        try:
+            kind, what = self._message
+        except (TypeError, ValueError) as broken:
+            raise EOFError from broken
         return kind, what
+
+    def _listen(self) -> None:
+        message: Any = ()
+        while message is not None:
+            try:
+                message = self.connection.recv()
+            except Exception:  # its end, half a message, or one that cannot be read here
+                message = None
+            self._heard.put(message)
+
+    def _came(self, seconds: float) -> bool:
+        """Whether a message has, within so many seconds."""
+        try:
+            self._message = self._heard.get(timeout=seconds)
+        except Empty:
+            return False
+        return True
 
     def say(self, kind: str, what: Any = None) -> None:
         """A dead worker is found out when it is heard."""
@@ -68,7 +89,8 @@ class Line:
     def close(self) -> None:
         """Whatever it and its children are at, it ends."""
         self.process.kill()
-        self.connection.close()
+        with suppress(OSError):
+            self.connection.close()
 
 
 class Isolated:
@@ -173,7 +195,11 @@ def last(line: Line) -> str:
 
 def whole(job: Case, limits: Limits, cwd: str | None = None) -> Outcome:
     """A case from its start to its end, timed beside no other."""
-    case = Isolated(job, limits, cwd)
+    return finished(Isolated(job, limits, cwd))
+
+
+def finished(case: Isolated) -> Outcome:
+    """The outcome of a case that nobody has listened to yet."""
     try:
         return case.prepared() or alone(case)
     finally:

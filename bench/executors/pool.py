@@ -6,31 +6,27 @@ from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
 
-from bench.executors.isolated import Isolated
-from bench.executors.running import alone
+from bench.executors.isolated import Isolated, finished
 from bench.isolation.limits import Limits
 from bench.outcome import Outcome
 from bench.worker import Measure
 
 
 def outcomes(jobs: Iterator[Measure], slots: int, limits: Limits) -> Iterator[Outcome]:
-    """As they come; a job is taken when a process is free for it."""
+    """As they come; a job is taken when a process is free for it. Closed early, it ends those that run."""
     running: dict[Future[Outcome], Isolated] = {}
     with ThreadPoolExecutor(slots) as threads:
         try:
             while True:
                 for job in islice(jobs, slots - len(running)):
                     case = Isolated(job, limits)
-                    running[threads.submit(_whole, case)] = case
+                    running[threads.submit(finished, case)] = case
                 if not running:
                     return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    running.pop(future)
-                    yield future.result()
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    del running[future]
+                yield from (future.result() for future in done)
         finally:
-            for case in running.values():  # an interrupt waits for nobody
+            for case in running.values():
                 case.close()
-
-
-def _whole(case: Isolated) -> Outcome:
-    return case.prepared() or alone(case)

@@ -1,17 +1,23 @@
-"""A verb of the command line as a confined process: limits as JSON, the parent's number, then the verb."""
+"""A verb of the command line as a confined process: limits as JSON, the parent's number and its line, then the verb."""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 
 from bench.isolation.inside import submit_to
 from bench.isolation.limits import Limits
 
+ENDED = "ended"
+
 
 def main() -> None:
-    """Submit to limits, then run the verb as if it had been called."""
-    given, parent, *arguments = sys.argv[1:]
+    """Submit to limits, then run the verb as if it had been called. The parent is told that it has come to its end, or
+    for what allocation it has not: an exit code is what any code of others can leave with.
+    """
+    given, parent, line, *arguments = sys.argv[1:]
+    os.set_inheritable(int(line), False)
     values = json.loads(given)
     affinity = values["affinity"]
     limits = Limits(memory=values["memory"], threads=values["threads"], affinity=affinity and tuple(affinity))
@@ -20,7 +26,18 @@ def main() -> None:
     from bench.cli import main as routes
     from bench.commands.limited import INSIDE
 
-    routes(arguments, prog_name="routes", obj=INSIDE)
+    try:
+        routes(arguments, prog_name="routes", obj=INSIDE)
+    except SystemExit:  # how click ends
+        os.write(int(line), ENDED.encode())
+        raise
+    except Exception as failure:
+        from bench.outcome import one_line, status_of
+
+        if status_of(failure) != "out-of-memory":
+            raise
+        os.write(int(line), one_line(failure)[:1000].encode())
+        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -63,10 +63,12 @@ def affinity_of(text: str | None) -> tuple[int, ...] | None:
         raise InputError(f"--affinity {text}: this system binds no process to processors - leave it out")
     usable, chosen = os.sched_getaffinity(0), set()
     for item in text.split(","):
-        first, _, last = item.strip().partition("-")
-        if not first.isdecimal() or not (last or first).isdecimal():
+        first, dash, last = item.strip().partition("-")
+        if not dash:
+            last = first
+        if not first.isdecimal() or not last.isdecimal():
             raise InputError(f"--affinity {text}: {item!r} is no processor - write 0 or 0,2-3")
-        chosen |= set(range(int(first[:6]), int((last or first)[:6]) + 1)) or {-1}
+        chosen |= set(range(int(first[:6]), int(last[:6]) + 1)) or {-1}
     if not chosen <= usable:
         raise InputError(f"--affinity {text}: usable are {_listed(usable)} - choose among them")
     return tuple(sorted(chosen))

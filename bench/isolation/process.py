@@ -16,14 +16,18 @@ from typing import IO, Any
 import psutil
 
 from bench.isolation.limits import Limits
-from bench.isolation.stack import ASKED
+from bench.isolation.stack import ASKED, without
 from bench.units import size
 
 TICK = 0.1  # [s] between two looks at its memory
+GRACE = 5.0  # [s] for the end of what has hung up
 KEPT = 20_000  # bytes of stderr
 LAST = 60  # lines of it
 WRITES = 0.2  # [s] it is given to write its stack
-EXHAUSTED = ("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory")
+EXHAUSTED = (
+    *("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory"),
+    "Memory allocation still failed",  # OpenBLAS
+)
 
 
 class Killed(Exception):
@@ -45,7 +49,8 @@ class Ending:
 class Confined:
     """`python -P -m MODULE ARGUMENTS` under limits.
 
-    watch(limits, until) waits; kill() ends it and everything it started; stderr is its last lines.
+    watch(until, deadline) waits; kill() ends it and everything it started; stderr is its last lines. Out of reach is
+    what has left its process group and lost its parent, too: a daemon.
     """
 
     def __init__(
@@ -110,9 +115,12 @@ class Confined:
 
     def ending(self) -> Ending:
         """What became of a process that is ending without having said why: its exit code or signal, read."""
-        code = self.process.wait()
+        ended = self.ended(GRACE)
         self.kill()  # what it started may still run
-        if any(word in self.stderr for word in EXHAUSTED):
+        if not ended:
+            return Ending("crashed", f"it hung up and was still running {GRACE:g} s later")
+        code = self.process.wait()
+        if any(word.encode() in self._stderr for word in EXHAUSTED):
             cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
             return Ending("out-of-memory", f"an allocation failed within --memory{cap}: {self._last_line()}")
         if code >= 0:
@@ -128,15 +136,16 @@ class Confined:
         return "\n".join(bytes(self._stderr).decode(errors="backslashreplace").splitlines()[-LAST:])
 
     def _last_line(self) -> str:
-        return next((line.strip() for line in reversed(self.stderr.splitlines()) if line.strip()), "")
+        return next((line.strip() for line in reversed(without(self.stderr).splitlines()) if line.strip()), "")
 
     def _listen(self, stream: IO[bytes]) -> None:
-        with stream, suppress(OSError, ValueError):
+        with suppress(OSError, ValueError), stream:
             while piece := os.read(stream.fileno(), 65536):
                 self._stderr = (self._stderr + piece)[-KEPT:]
                 if self._talkative:
-                    sys.stderr.write(piece.decode(errors="backslashreplace"))
-                    sys.stderr.flush()
+                    with suppress(OSError, ValueError):  # nobody listens: it must go on being read all the same
+                        sys.stderr.write(piece.decode(errors="backslashreplace"))
+                        sys.stderr.flush()
 
     def _descendants(self) -> list[psutil.Process]:
         try:

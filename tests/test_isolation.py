@@ -1,0 +1,457 @@
+"""Processes under limits: whatever a case does, it ends in a row, and nothing that it started goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+import pytest
+from conftest import ROOT, Ran, with_routes
+
+from bench.case import ProblemSpec, RouteSpec
+from bench.isolation.limits import Limits, affinity_of, memory_of
+from bench.pruning import Pruning
+from bench.rows import empty_row
+from bench.store import Store
+from problems.errors import InputError
+from routes.adjoint import adjoint
+
+FAULTY = ROOT / "tests" / "data" / "faulty.py"
+MARK = "ROUTES_TEST"  # a variable that all a test starts inherits, whatever groups and parents it leaves
+PATIENCE = 60.0  # [s] for what takes a moment, on a machine that is busy
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+@dataclass(frozen=True)
+class Shell:
+    """The command line in processes of its own, and what of them is left."""
+
+    folder: Path
+
+    def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            ["routes", *arguments],
+            cwd=self.folder,
+            env={**with_routes(), MARK: str(self.folder), **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="backslashreplace",
+        )
+
+    def run(self, *arguments: str, **environment: str) -> Ran:
+        return ended(self.start(*arguments, **environment))
+
+    def alive(self) -> list[psutil.Process]:
+        """Of all that was started, descendants that have left included."""
+        return [process for process in psutil.process_iter() if self._marked(process)]
+
+    def _marked(self, process: psutil.Process) -> bool:
+        try:
+            return process.environ().get(MARK) == str(self.folder) and process.status() != psutil.STATUS_ZOMBIE
+        except psutil.Error:
+            return False
+
+    def nothing_is_left(self) -> None:
+        eventually(lambda: not self.alive())
+
+    def asleep(self) -> None:
+        """Once a misdeed has begun: its child is there."""
+        eventually(lambda: any("time.sleep(987)" in word for process in self.alive() for word in words(process)))
+
+
+def words(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
+
+
+def ended(process: subprocess.Popen[str]) -> Ran:
+    out, err = process.communicate(timeout=2 * PATIENCE)
+    return Ran(process.returncode, out, err)
+
+
+def eventually(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Shell]:
+    shell = Shell(tmp_path)
+    yield shell
+    for process in shell.alive():
+        process.kill()
+
+
+def faulty(**options: object) -> str:
+    return f"{FAULTY}:Faulty[{','.join(f'{name}={value}' for name, value in options.items())}]"
+
+
+def by_misdeed(rows: list[dict]) -> dict[str, dict]:
+    return {row["problem_options"]["does"]: row for row in rows}
+
+
+ENDS = {
+    "nothing": ("ok", None),
+    "nan": ("non-finite", "2 of 2 gradient components not finite"),
+    "raise": ("failed", "ZeroDivisionError: division by zero"),
+    "quit": ("failed", "SystemExit: 4"),
+    "exit": ("crashed", "in its first forward solve: its process ended with exit code 3"),
+    "leave": ("crashed", "its process ended with exit code 0"),
+    "segfault": ("crashed", "its process was ended by SIGSEGV"),
+    "abort": ("crashed", "its process was ended by SIGABRT"),
+    "kill": ("crashed", "its process was ended by SIGKILL"),
+    "close": ("crashed", "its process ended with exit code 1"),
+    "take": ("out-of-memory", "MemoryError"),
+    "take_by_jax": ("out-of-memory", "RESOURCE_EXHAUSTED"),
+    "take_in_c": ("out-of-memory", "an allocation failed within --memory of 572 MiB: malloc"),
+    "take_by_child": ("out-of-memory", "> 572 MiB of --memory"),
+    "factorize": ("out-of-memory", "factors of R_u (10648 unknowns)"),
+    "garbage": ("ok", None),
+    "flood": ("ok", None),
+    "abandon": ("ok", None),
+}
+SAYS = {"garbage": "garbage of C", "flood": "the end", "take_in_c": "Cannot allocate memory", "close": "Bad file"}
+
+
+def test_every_misdeed_is_a_row_with_its_reason(started: Shell) -> None:
+    chosen = faulty(does="|".join(ENDS))
+    limits = ("--timeout", "120", "--memory", "600MB", "--jobs", "2")
+    ran = started.run("run", "--json", "--no-timing", "--problem", chosen, "--route", "fd-central", *limits)
+    assert ran.code == 1, "and stdout holds nothing but rows"
+    rows = by_misdeed(ran.rows)
+    assert {does: row["status"] for does, row in rows.items()} == {does: status for does, (status, _) in ENDS.items()}
+    for does, (status, says) in ENDS.items():
+        assert says is None or says in rows[does]["reason"], does
+        assert SAYS.get(does, "") in (rows[does]["stderr"] or "")
+        assert bool(rows[does]["traceback"]) == (status == "failed" or "Error" in (says or "") or does in TRACED)
+    assert "garbage of Python\n\x1b[31mgarbage without an end" in rows["garbage"]["stderr"]
+    kept = by_misdeed(Store(started.folder / "results" / "routes.sqlite").rows())
+    assert kept == rows
+    started.nothing_is_left()
+
+
+TRACED = ("nan", "factorize", "take_by_jax")
+
+HANGS = {
+    "hang": ("timeout", "after 10 s of --timeout"),
+    "stubborn": ("timeout", "after 10 s of --timeout"),
+    "escape": ("timeout", "after 10 s of --timeout"),
+    "scribble": ("timeout", "after 10 s of --timeout"),
+    "hang_up": ("crashed", "it hung up and was still running"),
+}
+
+
+def test_what_hangs_is_killed_with_all_that_it_started(started: Shell) -> None:
+    """Signal handlers do not run in C; half a message on the line to the runner does not stop it either."""
+    late = faulty(does="sleep", when=10, halved=True)
+    ran = started.run(
+        *("run", "--json", "--no-timing", "--problem", faulty(does="|".join(HANGS)), "--problem", late),
+        *("--route", "fd-central", "--timeout", "10", "--jobs", "6"),
+    )
+    assert ran.code == 1
+    rows = by_misdeed(ran.rows)
+    for does, (status, says) in HANGS.items():
+        assert (rows[does]["status"], says in rows[does]["reason"]) == (status, True), rows[does]["reason"]
+    assert rows["sleep"]["status"] == "timeout"
+    assert rows["sleep"]["gradient_error"] == pytest.approx(1.0), "a wrong gradient is known whatever comes after it"
+    assert "its gradient was known by then, its error 1" in rows["sleep"]["reason"]
+    started.nothing_is_left()
+
+
+def test_a_case_that_ends_while_it_is_timed_leaves_the_others_alone(started: Shell) -> None:
+    routes = ("fd-central", "fd-one-sided", f"{FAULTY}:never_timed")
+    chosen = [word for route in routes for word in ("--route", route)]
+    ran = started.run("run", "--json", "--problem", f"{FAULTY}:Faulty", *chosen)
+    rows = {row["route"]: row for row in ran.rows}
+    assert [rows[route]["status"] for route in routes] == ["ok", "ok", "crashed"]
+    died = rows[routes[2]]
+    assert "crashed in timing: its process ended with exit code 3; its gradient was known by then" in died["reason"]
+    assert died["peak_bytes"] is not None, "what was known is kept"
+    assert rows["fd-central"]["interleaved"] == rows["fd-one-sided"]["interleaved"] == 3
+
+
+def test_a_daemon_stops_nobody(started: Shell) -> None:
+    """It has left group and parent, and is out of reach; that it holds the lines open must not matter."""
+    ran = started.run("run", "--json", "--problem", faulty(does="daemonize"), "--route", "fd-central")
+    assert [row["status"] for row in ran.rows] == ["ok"]
+    (daemon,) = started.alive()
+    daemon.kill()
+
+
+def test_libraries_use_as_many_threads_as_they_may(started: Shell) -> None:
+    """By the processor time of each thread, which others on the machine do not change."""
+    allowed = str(max(os.sched_getaffinity(0)))
+    libraries = "by_blas|by_xla|by_pardiso"
+    command = ("run", "--json", "--no-timing", "--route", "fd-central", "--problem")
+    isolated = started.run(*command, faulty(does=libraries), "--threads", "1")
+    here = started.run(*command, faulty(does="by_blas|by_pardiso"), "--threads", "1", "--no-isolate")
+    said = [*(row["stderr"] for row in isolated.rows), *here.err.splitlines()]
+    assert len(said) == 5
+    assert all(float(line.removeprefix("busiest ")) > 0.9 for line in said), said
+    (row,) = started.run(*command, faulty(does="by_blas"), "--threads", "2").rows
+    if len(os.sched_getaffinity(0)) > 1:
+        assert float(row["stderr"].split()[1]) < 0.9, "this would be seen"
+    (row,) = started.run(*command, faulty(does="fingers"), "--affinity", allowed).rows
+    assert row["stderr"] == f"processors [{allowed}]"
+
+
+def test_larger_sizes_are_not_tried_after_a_limit_and_are_after_a_bug(started: Shell) -> None:
+    sizes = faulty(n="1|2|3|4", taken=400)
+    bugs = faulty(n="2|3", does="raise")
+    command = ("run", "--no-timing", "--problem", sizes, "--problem", bugs, "--route", "fd-central")
+    ran = started.run(*command, "--memory", "700MB", "--json")
+    rows = [(row["problem_options"]["does"], row["n_param"], row["status"]) for row in ran.rows]
+    assert rows == [
+        *(("nothing", 1, "ok"), ("nothing", 2, "out-of-memory"), ("nothing", 3, "pruned"), ("nothing", 4, "pruned")),
+        *(("raise", 2, "failed"), ("raise", 3, "failed")),
+    ]
+    assert ran.rows[2]["reason"] == (
+        "fd-central: out-of-memory at n_u = 0, n_p = 2 already - give more than --memory 668 MiB"
+    )
+
+
+def test_only_the_same_pair_is_pruned() -> None:
+    """Options that are no sizes tell pairs apart; a smaller size in any direction is tried."""
+    spec, route = ProblemSpec("x", {"n": 4, "seed": 1, "law": "a"}, None), RouteSpec("adjoint", adjoint, {"k": 1})
+    pruning = Pruning()
+    pruning.note(spec, route, (40, 4), empty_row() | {"status": "timeout", "timeout_s": 2.0})
+    pruning.note(spec, route, (10, 1), empty_row() | {"status": "crashed"})
+
+    def pruned(size: tuple[int, int], k: int = 1, **options: object) -> bool:
+        other = ProblemSpec("x", spec.options | options, None)
+        return pruning.reason(other, RouteSpec("adjoint", adjoint, {"k": k}), size) is not None
+
+    assert pruned((80, 8), n=8)
+    assert pruned((40, 8), n=8)
+    assert not pruned((40, 4)), "itself is tried again"
+    assert not pruned((20, 8), n=8)
+    assert not pruned((80, 8), n=8, law="b")
+    assert not pruned((80, 8), n=8, seed=2)
+    assert not pruned((80, 8), k=2, n=8)
+
+
+VERBS = {
+    "check": (f"{FAULTY}:Sleeping",),
+    "vcurve": ("--problem", faulty(does="sleep", when=0), "--route", "fd-central"),
+    "kink": ("--problem", faulty(does="sleep", when=0)),
+    "tolerance": ("--problem", faulty(does="sleep", when=0)),
+    "unrolling": ("--problem", faulty(does="sleep", when=0)),
+}
+
+
+def test_every_verb_ends_at_its_limit(started: Shell) -> None:
+    """In one line, with an exit code and a row that says so."""
+    running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
+    for verb, process in running.items():
+        ran = ended(process)
+        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less\n"
+        assert (ran.code, ran.out, ran.err) == (1, "", says)
+    names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
+    kept = [dict(zip(names, row, strict=True)) for row in rows]
+    assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(VERBS, "timeout")
+    assert {row["reason"] for row in kept} == {"after 8 s of --timeout"}
+    started.nothing_is_left()
+
+
+@pytest.mark.parametrize(
+    ("given", "code", "says"),
+    [
+        (("check", f"{FAULTY}:Leaving"), 1, "check: crashed: its process ended with exit code 0"),
+        (("check", "--json", f"{FAULTY}:Chatty"), 0, "garbage of C"),
+        (("tolerance", "--problem", faulty(does="leave", when=0)), 1, "tolerance: crashed: its process ended with"),
+        (("tolerance", "--problem", faulty(does="quit", when=0)), 1, "routes: tolerance: SystemExit: 4 - see --debug"),
+        (("unrolling", "--problem", faulty(does="raise", when=0)), 1, "unrolling: ZeroDivisionError"),
+        (
+            ("vcurve", "--problem", faulty(does="take", when=0), "--route", "fd-central", "--memory", "300MB"),
+            1,
+            "vcurve: out-of-memory: MemoryError: Unable to allocate",
+        ),
+    ],
+)
+def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
+    started: Shell, given: tuple[str, ...], code: int, says: str
+) -> None:
+    """An exit code of 0 would mean that a gradient agrees."""
+    ran = started.run(*given, "--no-store")
+    assert ran.code == code, ran.err
+    assert says in ran.err
+    assert "Traceback" not in ran.err
+    if code == 0:
+        assert json.loads(ran.out)["verdict"] == "agrees", "what C prints is no result"
+    else:
+        assert ran.out == ""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("model", ["Sleeping", "Stubborn"])
+def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str) -> None:
+    process = started.start("check", f"{FAULTY}:{model}")
+    started.asleep()
+    process.send_signal(signal.Signals[name])
+    ran = ended(process)
+    assert (ran.code, ran.out, ran.err) == (130, "", "routes: interrupted - nothing is kept\n")
+    started.nothing_is_left()
+    assert not (started.folder / "results" / "routes.sqlite").exists()
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("jobs", ["1", "3"])
+def test_an_interrupted_run_shows_what_is_done_and_how_to_go_on(started: Shell, jobs: str, name: str) -> None:
+    given = ("run", "--problem", faulty(does="nothing"), "--problem", faulty(does="sleep"), "--route", "fd-central")
+    process = started.start(*given, "--no-timing", "--jobs", jobs)
+    started.asleep()
+    eventually(lambda: bool(Store(started.folder / "results" / "routes.sqlite").latest()))
+    process.send_signal(signal.Signals[name])
+    ran = ended(process)
+    assert ran.code == 130
+    assert ran.out.count("fd-central") >= 1
+    assert ran.err.count("\n") == 1
+    assert "what is finished is printed, and kept unless --no-store; go on with: routes run --problem" in ran.err
+    assert ran.err.endswith("--resume\n")
+    (kept,) = Store(started.folder / "results" / "routes.sqlite").rows()
+    assert (kept["status"], kept["problem_options"]["does"]) == ("ok", "nothing")
+    started.nothing_is_left()
+
+
+@pytest.mark.parametrize("given", [("run", "--problem", faulty(does="hang"), "--route", "fd-central"), ("check",)])
+def test_a_killed_runner_takes_its_worker_with_it(started: Shell, given: tuple[str, ...]) -> None:
+    """Hanging in C or not. What a worker had started, nobody is there to end."""
+    process = started.start(*given, *([f"{FAULTY}:Sleeping"] if given == ("check",) else []))
+    eventually(lambda: len(started.alive()) >= 2)
+    process.kill()
+    process.communicate()
+    eventually(lambda: not any("bench." in word for left in started.alive() for word in words(left)))
+
+
+def test_nothing_beside_a_file_or_in_the_folder_hides_a_library(tmp_path: Path) -> None:
+    """Nor does a path with spaces and letters of other alphabets stop anyone."""
+    folder = tmp_path / "mødels of mine"
+    (folder / "problems").mkdir(parents=True)
+    (folder / "problems" / "__init__.py").write_text("raise ImportError('not this one')")
+    for name in ("bench", "routes", "jax", "numpy", "scipy", "click", "psutil", "types", "random", "beside"):
+        says = "raise ImportError('not this one')" if name != "beside" else "from faulty import Faulty, Sound"
+        (folder / f"{name}.py").write_text(says)
+    (folder / "faulty.py").write_text(FAULTY.read_text())
+    (folder / "модель 1.py").write_text("from beside import Faulty, Sound")
+    shell = Shell(folder)
+    ran = shell.run(
+        *("run", "--json", "--min-time", "0", "--problem", "модель 1.py:Faulty[n=2|3]", "--problem", "bar"),
+        *("--route", "fd-central", "--route", "implicit-ad"),
+    )
+    assert sorted(row["status"] for row in ran.rows) == ["ok"] * 4 + ["skipped"] * 2, ran.err
+    assert shell.run("check", "модель 1.py:Sound", "--no-plot").code == 0
+
+
+IMPORTED = """
+import ctypes, os, sys
+if "bench.worker" in sys.orig_argv:
+    {}
+from faulty import Faulty
+"""
+
+
+def test_a_file_may_misbehave_in_a_worker_only(started: Shell) -> None:
+    """While it is imported there: the survey of sizes goes on, too."""
+    (started.folder / "faulty.py").write_text(FAULTY.read_text())
+    misdeeds = {"hangs": "ctypes.PyDLL(None).sleep(987)", "leaves": "os._exit(0)", "raises": "1 / 0"}
+    for name, misdeed in misdeeds.items():
+        (started.folder / f"{name}.py").write_text(IMPORTED.format(misdeed))
+    chosen = [word for name in (*misdeeds, "faulty") for word in ("--problem", f"{name}.py:Faulty")]
+    ran = started.run("run", "--json", *chosen, "--route", "fd-central", "--min-time", "0", "--timeout", "8")
+    rows = {row["problem"].partition(".")[0]: row for row in ran.rows}
+    assert {name: row["status"] for name, row in rows.items()} == {
+        "hangs": "timeout", "leaves": "crashed", "raises": "crashed", "faulty": "ok",
+    }  # fmt: skip
+    assert "in its start" in rows["raises"]["reason"]
+    assert "ZeroDivisionError" in rows["raises"]["stderr"]
+    started.nothing_is_left()
+
+
+def test_a_gradient_of_many_components_comes_through(started: Shell) -> None:
+    n = 200_000
+    given = ("--problem", f"{FAULTY}:Faulty[n={n}]", "--route", f"{FAULTY}:itself", "--gradient", "g.csv")
+    ran = started.run("run", *given, "--min-time", "0", "--no-store")
+    assert ran.code == 0, ran.err
+    with (started.folder / "g.csv").open() as file:
+        assert sum(1 for _ in file) == n + 1
+
+
+def test_what_c_prints_is_no_result_without_processes_either(started: Shell) -> None:
+    for when in (0, 1):
+        chosen = ("--problem", faulty(does="garbage", when=when), "--problem", "bar", "--route", "fd-central")
+        ran = started.run("run", "--json", "--no-isolate", "--min-time", "0", "--no-store", *chosen)
+        assert [row["status"] for row in ran.rows] == ["ok", "ok"]
+
+
+def test_no_descriptor_is_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    from bench import case
+    from bench.runner import How, run
+    from bench.workbench import Settings
+
+    problems, routes = case.problems([faulty(does="nothing|exit")]), case.routes(["fd-central"])
+    settings, how = Settings(timed=False), How(limits=Limits(timeout=PATIENCE))
+    counts = []
+    for _ in range(2):
+        assert [o.row["status"] for o in run(problems, routes, settings, how)] == ["ok", "crashed"]
+        counts.append(len(os.listdir("/proc/self/fd")))
+    assert counts[0] == counts[1]
+
+
+def test_an_allocation_that_superlu_misses_is_no_singular_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
+    import scipy.sparse
+    import scipy.sparse.linalg
+
+    from bench.outcome import status_of
+    from routes.factorization import Factorizer
+
+    def splu(A: object) -> None:
+        raise RuntimeError("SUPERLU_MALLOC fails for buf in intCalloc() at line 173 in file memory.c\n")
+
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", splu)
+    with pytest.raises(MemoryError, match="factors of R_u") as failure:
+        Factorizer("superlu")(scipy.sparse.eye_array(3).tocsc(), "x")
+    assert status_of(failure.value) == "out-of-memory"
+
+
+@pytest.mark.parametrize("text", ["64", "0", "-1GiB", "GiB", "1XiB", "nan", "inf", "1e30"])
+def test_sizes_that_are_none(text: str) -> None:
+    with pytest.raises(InputError, match="--memory"):
+        memory_of(text)
+
+
+def test_sizes() -> None:
+    texts = {"4GiB": 2**32, "4G": 2**32, "500MB": 500 * 10**6, "1.5 GiB": 3 * 2**29, "100000000": 10**8, "none": None}
+    assert {text: memory_of(text) for text in texts} == texts
+
+
+@pytest.mark.parametrize("text", ["", "a", "0-", "-1", "3-1", "0,,1", "999999", "0-99999999"])
+def test_processors_that_are_none(text: str) -> None:
+    with pytest.raises(InputError, match="--affinity"):
+        affinity_of(text)
+    assert affinity_of(",".join(map(str, os.sched_getaffinity(0)))) == tuple(sorted(os.sched_getaffinity(0)))
+
+
+def test_limits_without_processes_are_refused(cli) -> None:
+    run = ("run", "--problem", "bar", "--route", "adjoint", "--no-store", "--no-isolate")
+    for given, says in (
+        (("--timeout", "3"), "--timeout: holds for processes of their own"),
+        (("--memory", "1GiB"), "--memory: holds for processes of their own"),
+        (("--jobs", "2", "--no-timing"), "--jobs 2: needs processes"),
+        (("--threads", "0"), "--threads 0 - give 1 or more"),
+    ):
+        ran = cli(*run, *given)
+        assert (ran.code, says in ran.err, ran.err.count("\n")) == (2, True, 1), ran.err
