@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bench.report.bill import FORWARD, MEMORY, SECONDS, TAPE
+from bench.report.bill import FORWARD, MEMORY, SECONDS, TAPE, UNRESOLVED
 from bench.report.figure import Axis, Facet, Figure, Guide, Section, Series
 from bench.report.picking import grouped, in_order, sorted_by, tabulate, text
 from bench.report.source import Source, selector
@@ -57,7 +57,7 @@ def growth(cases: Sequence[Row]) -> list[Figure]:
         series=tuple(Series(route, styles[route], line, facet) for route, line, facet in lines),
         facets=tuple(facets),
     )
-    bare = tuple(replace(facet, says="") for facet in facets)
+    bare = tuple(replace(facet, says="", guides=UNRESOLVED) for facet in facets)
     memory = replace(time, id="growth-memory", title="Memory against size", says=HELD, y=(MEMORY, TAPE), facets=bare)
     return [time, memory] if any(row["peak_bytes"] is not None for row in rows) else [time]
 
