@@ -50,7 +50,7 @@ def growth(cases: Sequence[Row]) -> list[Figure]:
     time = Figure(
         "growth",
         "Time against size",
-        f"{len(facets)} {'problem' if len(facets) == 1 else 'problems'} run at {FEWEST} sizes or more; flat is free.",
+        f"{len(facets)} {'problem' if len(facets) == 1 else 'problems'} run at {FEWEST} sizes or more, all else alike.",
         tabulate("cases", rows, columns),
         x=(Axis("n_state", "n_u, unknowns", scale="log"), Axis("n_param", "n_p, parameters", scale="log")),
         y=(SECONDS, FORWARD),
@@ -138,7 +138,7 @@ def crossing(races: Sequence[Row]) -> Figure | None:
     return Figure(
         "break-even",
         "From how many parameters on",
-        " ".join(dict.fromkeys(f"{row['says']}." for row in rows[:2] if row["says"])),
+        " ".join(dict.fromkeys(f"{row['pair']}: {row['says']}." for row in rows[:3] if row["says"])),
         tabulate("break_even", rows, f"{columns} fixed_s each_s other_fixed_s other_each_s predicted_says", known),
         x=(Axis("break_even", "parameters at which both cost the same", scale="log"),),
         y=(Axis("pair", "", scale="category"),),
