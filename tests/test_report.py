@@ -137,9 +137,9 @@ def points(figure: Figure, kept: Any = lambda problem, route: True) -> int:
             at = [table.column(own or axis.column)[i] for own, axis in ((series.x, x), (series.y, y))]
             negative = any(a.scale == "log" and v is not None and v < 0 for a, v in zip((x, y), at, strict=True))
             who = [table.column(name)[i] if name in table.names else None for name in ("problem", "route")]
-            count += None not in at and not negative and kept(*who)
-    known = [v for v in figure.values if any(w is not None for w in table.column(v.column))]
-    return count * (len(known) if figure.mark == "cells" else 1)
+            drawn = None not in at and not negative and kept(*who)
+            count += drawn * (len(draw.valued(figure, series.facet)) if figure.mark == "cells" else 1)
+    return count
 
 
 def expected(report: Report, kept: Any = lambda problem, route: True) -> dict[str, int]:

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 
 from bench import registry
-from bench.report.figure import Axis, Facet, Figure, Section, Series
+from bench.report.figure import Axis, Facet, Figure, Guide, Section, Series
 from bench.report.picking import by_column, grouped, in_order, real, tabulate, text
 from bench.report.source import Source
 from bench.report.style import of_route, others
 from bench.rows import Row
 from bench.views.format import bytes_, number, ratio, seconds
+from bench.views.tables import RESOLUTION
 
 ERROR = Axis("gradient_error", "|g − g_ref| / |g_ref|", scale="log")
 SECONDS = Axis("seconds", "time of one gradient", "s", "log")
@@ -30,6 +31,7 @@ COUNTED = (
     real("adjoint", "1", "substitutions with R_u^T"),
     real("products", "1", "products with R_u or R_u^T"),
 )
+UNRESOLVED = (Guide("y", RESOLUTION, "not resolved below", "peak_bytes"),)
 CASE = "problem route n_state n_param"
 
 
@@ -101,6 +103,7 @@ def memory(rows: Sequence[Row]) -> Figure | None:
         x=(SECONDS, FORWARD),
         y=(MEMORY, TAPE),
         series=of_bare_routes(known),
+        facets=(Facet(guides=UNRESOLVED),),
         mark="points",
     )
 

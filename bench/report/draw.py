@@ -75,9 +75,15 @@ def write(sections: Sequence[Section], folder: Path) -> list[str]:
 def panels(figure: Figure) -> list[Panel]:
     """Those that are drawn."""
     facets = dict.fromkeys(series.facet for series in figure.series)
-    known = [v for v in figure.values if any(w is not None for w in figure.table.column(v.column))]
-    values: list[Axis | None] = [*known] if figure.mark == "cells" else [None]
-    return [Panel(facet, figure.facets[facet], value) for facet in facets for value in values][:PANELS]
+    return [Panel(facet, figure.facets[facet], value) for facet in facets for value in valued(figure, facet)][:PANELS]
+
+
+def valued(figure: Figure, facet: int) -> list[Axis | None]:
+    """What cells of a panel are coloured by: what is known of them."""
+    if figure.mark != "cells":
+        return [None]
+    rows = [i for series in figure.series if series.facet == facet for i in series.rows]
+    return [v for v in figure.values if any(figure.table.column(v.column)[i] is not None for i in rows)]
 
 
 def picture(figure: Figure) -> Any:

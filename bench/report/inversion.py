@@ -39,8 +39,8 @@ def section(source: Source) -> Section | None:
 
 
 def named(row: Row) -> str:
-    """Route, optimizer, weight."""
-    alpha = f", alpha = {row['alpha']:g}" if row["alpha"] else ""
+    """Route, optimizer, and the weight where the problem's name does not tell it."""
+    alpha = f", alpha = {row['alpha']:g}" if row["alpha"] and "alpha=" not in row["problem"] else ""
     return f"{row['route']}, {row['optimizer']}{alpha}"
 
 

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from bench.report.figure import Axis, Facet, Figure, Guide, Section, Series
 from bench.report.picking import by_column, grouped, in_order, sorted_by, tabulate
 from bench.report.source import Source
-from bench.report.style import of_route, of_routes, others
+from bench.report.style import of_route, of_routes, others, variant
 from bench.rows import Row
 from bench.views.format import number
 
 OFF = {"off_left": "from the left slope", "off_right": "from the right slope"}
+ROUNDING = 1e-12
 J, SLOPE = Axis("objective", "J"), Axis("slope", "dJ/ds")
 
 
@@ -69,10 +70,15 @@ def _facet(problem: str, event: Row | None) -> Facet:
     sides = f"{event['active_set']} to {event['active_set_right']}"
     slopes = ""
     if event["jump"] is not None:
-        left, right = number(event["slope"], 4), number(event["slope_right"], 4)
+        left, right = (_rounded(event[side], event["jump"]) for side in ("slope", "slope_right"))
         slopes = f" and dJ/ds jumps from {left} to {right}"
     says = f"At s = {event['s']:.6g} the active set changes, {sides}{slopes}."
     return Facet(problem, says=says, guides=(Guide("x", event["s"], "event"),))
+
+
+def _rounded(slope: float, jump: float) -> str:
+    """What rounding leaves of a zero is none."""
+    return number(slope if abs(slope) > ROUNDING * abs(jump) else 0.0, 4)
 
 
 def stencils(rows: Sequence[Row]) -> Figure | None:
@@ -108,7 +114,8 @@ def trade(rows: Sequence[Row]) -> Figure | None:
     panels = grouped(drawn, lambda row: row["problem"])
     over = "k_c" if len({row["k_c"] for row in drawn}) > 1 else "width"
     axes = {"k_c": Axis("k_c", "stiffness of the stop", "N/m", "log"), "width": Axis("width", "width", "m", "log")}
-    routes = of_routes(in_order(row["route"] for row in drawn))
+    names = list(dict.fromkeys(f"{row['route']}, s = {row['s']:.3g}" for row in drawn))
+    styles = {name: variant(of_route(name.partition(",")[0]), k) for k, name in enumerate(names)}
     return Figure(
         "rounding",
         "What rounding the kink costs",
@@ -126,9 +133,9 @@ def trade(rows: Sequence[Row]) -> Figure | None:
             Axis("newton_iterations", "Newton iterations"),
         ),
         series=tuple(
-            Series(f"{route}, s = {s:.3g}", routes[route], sorted_by(drawn, (places[i] for i in of), over), facet)
+            Series(name, styles[name], sorted_by(drawn, (places[i] for i in of), over), facet)
             for facet, places in enumerate(panels.values())
-            for (route, s), of in grouped([drawn[i] for i in places], lambda r: (r["route"], r["s"])).items()
+            for name, of in grouped([drawn[i] for i in places], lambda r: f"{r['route']}, s = {r['s']:.3g}").items()
         ),
         facets=tuple(Facet(problem) for problem in panels),
     )

@@ -80,9 +80,9 @@ const scaleOf = (axis, values, view) => {
   const pad = 0.04 * (high - bottom);
   const [a, b] = view || [bottom - pad, high + pad];
   const place = (v) => (v === 0 && log ? bottom : v > 0 || !log ? to(v) : NaN);
-  return { at: (v) => (place(v) - a) / (b - a), back: (f) => a + f * (b - a), range: [a, b], ticks: ticksOf(axis, a, b, log, zero ? bottom : null, low) };
+  return { at: (v) => (place(v) - a) / (b - a), back: (f) => a + f * (b - a), range: [a, b], ticks: ticksOf(axis, a, b, log, zero ? bottom : null, low, known.every(Number.isInteger)) };
 };
-const ticksOf = (axis, a, b, log, zero, low) => {
+const ticksOf = (axis, a, b, log, zero, low, whole) => {
   const name = (v) => (axis.unit in UNITS ? inUnit(v, axis.unit, 3) : digits(v, 4));
   const ticks = [];
   if (log && b - a > 1.3) {
@@ -98,7 +98,7 @@ const ticksOf = (axis, a, b, log, zero, low) => {
     const [from, to] = log ? [10 ** a, 10 ** b] : [a, b];
     const raw = (to - from) / 6;
     const size = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].find((m) => m * size >= raw) * size;
+    const step = Math.max([1, 2, 5, 10].find((m) => m * size >= raw) * size, whole ? 1 : 0);
     for (let k = Math.ceil(from / step); k * step <= to; k++) ticks.push({ v: k * step, label: name(Number((k * step).toPrecision(12))) });
   }
   if (zero !== null && zero >= a) ticks.push({ v: 0, label: "0" });

@@ -31,6 +31,9 @@ const legend = (state) => {
   [...node.querySelectorAll(".legend button")].forEach((b, k) => b.prepend(swatch([...names.values()][k], figure.mark)));
 };
 
+const valuesOf = ({ figure, table }, facet) => // those that cells of a panel are coloured by
+  figure.mark === "cells" ? figure.values.filter((v) => figure.series.some((s) => s.f === facet && s.r.some((row) => table.column[v.c].values[row] !== null))) : [null];
+
 const drawFigure = (state) => {
   state.drawn = true;
   const { figure, table, node } = state;
@@ -38,15 +41,15 @@ const drawFigure = (state) => {
     legend(state);
     const area = node.querySelector(".panels");
     const wanted = figure.facets.map((_, k) => k).filter((k) => figure.series.some((s) => s.f === k && s.r.some((row) => kept(table, row))));
-    const values = figure.mark === "cells" ? figure.values.filter((v) => table.column[v.c].values.some((w) => w !== null)) : [null];
     const room = node.clientWidth || 700;
     const small = figure.mark === "cells";
-    const columns = Math.min(wanted.length * values.length, room >= 640 ? (small ? 4 : 2) : small && room >= 300 ? 2 : 1);
+    const count = wanted.reduce((sum, k) => sum + valuesOf(state, k).length, 0);
+    const columns = Math.min(count, room >= 640 ? (small ? 4 : 2) : small && room >= 300 ? 2 : 1);
     area.style.setProperty("--columns", columns);
     area.classList.toggle("small", small);
     const width = Math.floor(Math.min(1040, (room - (columns - 1) * (columns > 2 || room < 640 ? 16 : 28)) / columns));
     const some = state.all ? wanted : wanted.slice(0, FIRST);
-    area.replaceChildren(...some.flatMap((k) => values.map((value) => panel(state, k, width, value))));
+    area.replaceChildren(...some.flatMap((k) => valuesOf(state, k).map((value) => panel(state, k, width, value))));
     if (!wanted.length) area.append(html("p", { class: "nothing" }, "Nothing to draw with these filters."));
     if (some.length < wanted.length) area.append(button(`Show all ${wanted.length} panels`, () => { state.all = true; drawFigure(state); }, { class: "more" }));
   }

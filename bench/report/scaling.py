@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bench.report.bill import FORWARD, MEMORY, SECONDS, TAPE
+from bench.report.bill import FORWARD, MEMORY, SECONDS, TAPE, UNRESOLVED
 from bench.report.figure import Axis, Facet, Figure, Guide, Section, Series
 from bench.report.picking import grouped, in_order, sorted_by, tabulate, text
 from bench.report.source import Source, selector
@@ -50,14 +50,14 @@ def growth(cases: Sequence[Row]) -> list[Figure]:
     time = Figure(
         "growth",
         "Time against size",
-        f"{len(facets)} {'problem' if len(facets) == 1 else 'problems'} run at {FEWEST} sizes or more; flat is free.",
+        f"{len(facets)} {'problem' if len(facets) == 1 else 'problems'} run at {FEWEST} sizes or more, all else alike.",
         tabulate("cases", rows, columns),
         x=(Axis("n_state", "n_u, unknowns", scale="log"), Axis("n_param", "n_p, parameters", scale="log")),
         y=(SECONDS, FORWARD),
         series=tuple(Series(route, styles[route], line, facet) for route, line, facet in lines),
         facets=tuple(facets),
     )
-    bare = tuple(replace(facet, says="") for facet in facets)
+    bare = tuple(replace(facet, says="", guides=UNRESOLVED) for facet in facets)
     memory = replace(time, id="growth-memory", title="Memory against size", says=HELD, y=(MEMORY, TAPE), facets=bare)
     return [time, memory] if any(row["peak_bytes"] is not None for row in rows) else [time]
 
@@ -138,7 +138,7 @@ def crossing(races: Sequence[Row]) -> Figure | None:
     return Figure(
         "break-even",
         "From how many parameters on",
-        " ".join(dict.fromkeys(f"{row['says']}." for row in rows[:2] if row["says"])),
+        " ".join(dict.fromkeys(f"{row['pair']}: {row['says']}." for row in rows[:3] if row["says"])),
         tabulate("break_even", rows, f"{columns} fixed_s each_s other_fixed_s other_each_s predicted_says", known),
         x=(Axis("break_even", "parameters at which both cost the same", scale="log"),),
         y=(Axis("pair", "", scale="category"),),

@@ -24,13 +24,21 @@ LOOSE = 1e-3  # tolerance at which routes are compared in words
 
 
 def section(source: Source) -> Section | None:
-    rows = [row for row in source.table("tolerance") if row["rtol"] is not None]
+    rows = source.table("tolerance")
+    measured = [row for row in rows if row["rtol"] is not None]
+    skipped = [row for row in rows if row["rtol"] is None]
     if not rows:
         return None
+    figures = ([curves(measured)] if measured else []) + ([left_out(skipped)] if skipped else [])
     says = (
         "Differences differentiate the solver's noise; the adjoint relies on an identity that a loose solve violates."
     )
-    return Section("tolerance", "Tolerance of the solves", says, (curves(rows),))
+    return Section("tolerance", "Tolerance of the solves", says, tuple(figures))
+
+
+def left_out(rows: list[Row]) -> Figure:
+    table = tabulate("tolerance", rows, "problem route linear_solver sweep status reason")
+    return Figure("tolerance-skipped", "Routes that were not swept", f"{len(rows)}, each with its reason.", table)
 
 
 def curves(rows: list[Row]) -> Figure:
