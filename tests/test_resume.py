@@ -93,7 +93,7 @@ def test_what_is_missing_or_failed_is_run_and_told_from_what_is_done(plugin: Pat
     for only in ("failed", "missing", "missing", "failed", "stale", "all"):
         done = cli(*sweep, "--only", only)
         told.setdefault(only, []).append([row["problem_options"]["fails"] for row in done.rows])
-        assert f"{len(done.rows)} of 2 cases were run" in done.err
+        assert f"{len(done.rows)} of 2 cases run" in done.err
     assert told == {"failed": [[], [True]], "missing": [[True], []], "stale": [[]], "all": [[False, True]]}
     assert [row["status"] for row in cli(*sweep, "--resume").rows] == ["failed"], "what failed is no answer"
 

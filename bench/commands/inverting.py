@@ -93,7 +93,13 @@ class Run:
         """The one-shot answer, where there is one: what the loop has to beat."""
         from bench.inversion.one_shot import of_problem
 
-        if not problem.affine or problem.observation is None:
+        if not problem.affine:
+            return
+        prior = problem.regularization
+        if prior is not None and prior.kind == "tv" and prior.alpha:
+            self._say(
+                lambda: self.out.print("u is affine in p, but total variation is not quadratic: no one-shot answer")
+            )
             return
         found = of_problem(problem, self.routes[0], self.engine, self.at)
         self._say(
