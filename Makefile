@@ -3,13 +3,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 GATE := results/gate.sqlite
+REPORTED := $(if $(wildcard results/routes.sqlite),results/routes.sqlite,results/reference.sqlite)
 # small problems, not timed: counts, errors and verdicts are exact, and time is another gate's
 MATRIX := --problem bar --problem 'block[n=2]' --problem 'advection[n=4]' --route all --no-timing --jobs 2
 DEFAULT := --problem 'bar[n=8|100|1000|10000|100000|1000000]' --problem 'block[n=4|6|8]' --problem 'advection[n=8|16|32]'
 CHECKED := adjoint faulty-adjoint
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline reports clean
+.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -73,8 +74,11 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m bench.studies.reporting
 	$(BIN)/python -m bench.studies.killing
 
-reports: $(READY) ## everything in results/ as one page, results/report.html
-	$(BIN)/routes report -o results/report.html
+reports: $(READY) ## everything in results/ as one page, results/report.html; of the reference run where there is no other
+	$(BIN)/routes report --store $(REPORTED) -o results/report.html
+
+reference: $(READY) ## the small reference run that is committed, and its report, anew
+	$(BIN)/python -m bench.studies.reference
 
 clean: ## remove what was installed, built and cached; keep results/
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks

@@ -31,6 +31,7 @@ class Run:
 
         self.spec, self.routes, self.engine, self.at = spec, routes, engine, at
         self.quiet, self.plots, self.started, self.interrupted = quiet, plots, now(), False
+        self.one_shot: float | None = None
         self.out: Console = console(stderr=quiet)
 
     def each(
@@ -53,7 +54,7 @@ class Run:
             found = invert(self.spec, route, self.engine, self.at, p, self._line, problem, run, offset)
             done.append(found)
             self.interrupted = found.interrupted
-            self._say(lambda found=found: view.ended(self.out, found))
+            self._say(lambda found=found: view.ended(self.out, found, self.one_shot))
         if not self.quiet:
             self._show(done)
         return {name: [row for found in done for row in found.tables[name]] for name in ("inversion", "estimates")}
@@ -102,6 +103,7 @@ class Run:
             )
             return
         found = of_problem(problem, self.routes[0], self.engine, self.at)
+        self.one_shot = found.J
         self._say(
             lambda: self.out.print(
                 f"u is affine in p: one linear least-squares solve gives J = {found.J:.6g}, for {found.forward_solves}"

@@ -25,6 +25,7 @@ LEGEND = (
 )
 MANY = 40  # parameters; of more, both ends are shown
 COORDINATES = ("x", "y", "z")
+SAME = 1e-6  # of J
 BARS = 12  # characters of the longest bar
 
 
@@ -45,9 +46,14 @@ def line(out: Console, step: Iterate) -> None:
         out.print(Text(f"     {step.says}", style="yellow"), soft_wrap=True)
 
 
-def ended(out: Console, found: Inversion) -> None:
+def ended(out: Console, found: Inversion, one_shot: float | None = None) -> None:
+    """Why it stopped, and how it stands to the one-shot answer."""
     well = found.end.startswith("converged")
     out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=True)
+    if one_shot is not None:
+        above = found.iterates[-1].objective / one_shot - 1.0 if one_shot > 0.0 else 0.0
+        stands = "meets the one-shot answer" if above <= SAME else "stays above the one-shot answer"
+        out.print(Text(f"the loop {stands}: J is {above:+.1e} of it away"), soft_wrap=True)
 
 
 def costs(done: Sequence[Inversion]) -> Table:
