@@ -52,7 +52,8 @@ class Inversion:
     """What came of it: columns as in bench.study_rows, and the arrays behind them.
 
     p, gradient (n_p,) at the end; start p_0; truth where known; view, what the problem shows beside; `end` says why it
-    stopped, and `interrupted` that Ctrl-C did; warning is of scaling.
+    stopped, and `interrupted` that Ctrl-C did; `scaled` says what the optimizer's numbers are
+    in units of, warning what is wrong with them.
     """
 
     problem: str
@@ -75,6 +76,7 @@ class Inversion:
     end: str = field(repr=False)
     interrupted: bool = field(repr=False)
     warning: str | None = field(repr=False)
+    scaled: str = field(repr=False)
 
     @property
     def shared(self) -> Row:
@@ -162,6 +164,7 @@ def invert(
         end,
         interrupted,
         variables.warning(data(problem, best.p)),
+        f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
     )
 
 

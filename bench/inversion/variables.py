@@ -52,6 +52,14 @@ class Variables:
             return self.scale * (0.5 * (1.0 + np.tanh(0.5 * x)))
         return self.scale
 
+    @property
+    def described(self) -> str:
+        """What x is in units of, in words."""
+        low, high = float(self.scale.min()), float(self.scale.max())
+        size = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+        how = {"none": "", "log": ", its logarithm varied", "softplus": ", softplus of what is varied"}[self.positive]
+        return f"p in units of {size}{how}"
+
     def warning(self, data: Array | None) -> str | None:
         """What spans decades, and the remedy; None where all is near one."""
         spanned = decades(self.scale)

@@ -50,6 +50,7 @@ def ended(out: Console, found: Inversion, one_shot: float | None = None) -> None
     """Why it stopped, and how it stands to the one-shot answer."""
     well = found.end.startswith("converged")
     out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=True)
+    out.print(Text(found.scaled, style="dim"), soft_wrap=True)
     if one_shot is not None:
         above = found.iterates[-1].objective / one_shot - 1.0 if one_shot > 0.0 else 0.0
         stands = "meets the one-shot answer" if above <= SAME else "stays above the one-shot answer"
