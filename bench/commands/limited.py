@@ -152,7 +152,7 @@ def _interrupted(process: Confined) -> int:
     with suppress(Killed, KeyboardInterrupt):  # its time is over, or the user's patience
         process.watch(process.ended, time.monotonic() + GRACE)
     process.kill()
-    if process.process.returncode != INTERRUPTED:
+    if "routes: interrupted" not in process.stderr:
         complain("interrupted - nothing is kept")
     return INTERRUPTED
 
