@@ -12,7 +12,7 @@ from typing import Any
 from bench import case
 from bench.environment import versions
 from bench.rows import Row, clean
-from bench.sources import digest
+from bench.sources import Stamp, digest, stamp, stamps
 from bench.workbench import Settings
 
 HARNESS = 4  # raised when rows come to mean something else: all that was kept before is then stale
@@ -40,6 +40,12 @@ def content_key(case_key: str, problem: case.ProblemSpec, route: case.RouteSpec,
     data = [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in case.files([problem], at)]
     code = [digest(problem.build), digest(route.route)]
     return hashed(case_key, code, data, versions(), platform.python_version(), HARNESS)
+
+
+def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:
+    """The files that a content key is of: as long as they are as they were, so is what it stands for."""
+    data = tuple(stamp(Path(file)) for file in case.files([problem], at))
+    return (*stamps(problem.build), *stamps(route.route), *data)
 
 
 def hashed(*parts: Any) -> str:

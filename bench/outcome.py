@@ -68,6 +68,12 @@ def unbuilt(row: Row, problem: str, failure: BaseException) -> Outcome:
     return Outcome(row)
 
 
+def outdated(row: Row, file: str) -> Row:
+    """The row of a case whose code or data have changed while it ran."""
+    reason = f"{row['route']}: {file} has changed since the run began - run it again"
+    return row | {"status": "failed", "reason": reason}
+
+
 def refused(row: Row, refusal: RoutesError) -> Outcome:
     """The outcome of a case whose problem does not take what it was given."""
     return Outcome(row | {"status": "failed", "reason": str(refusal)}, refusal=refusal)

@@ -11,7 +11,7 @@ from typing import Any
 from bench.accuracy import Found
 from bench.case import ProblemSpec, RouteSpec
 from bench.isolation.limits import Limits
-from bench.keys import identified
+from bench.keys import identified, witnesses
 from bench.measurement import begun_row
 from bench.outcome import Outcome
 from bench.pruning import Pruning, Size
@@ -134,7 +134,8 @@ class Sweep:
         for problem, size in problems:
             found: Found = {}
             for route in self.routes:
-                job = Measure(problem, route, self.settings, self._row(problem, route), found)
+                known = witnesses(problem, route, self.settings.at)
+                job = Measure(problem, route, self.settings, self._row(problem, route), found, known)
                 if not self.wanted(job.row):
                     continue
                 self._started[job.row["case_key"]] = next(self._places), job, size

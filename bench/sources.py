@@ -16,25 +16,52 @@ HERE = Path(__file__).resolve().parent.parent
 OURS = ("problems", "routes")
 
 
+Stamp = tuple[str, int, int]  # a file, when it was last written [ns], its size
+
+
 def digest(target: Any) -> str:
     """Of the source of a factory or a Route; of its name where it has no source that can be read."""
+    return _source(target)[0]
+
+
+def stamps(target: Any) -> tuple[Stamp, ...]:
+    """The files that the digest is of, as they were when it was taken."""
+    return _source(target)[1]
+
+
+def stamp(file: Path) -> Stamp:
+    status = file.stat()
+    return str(file), status.st_mtime_ns, status.st_size
+
+
+def changed(known: tuple[Stamp, ...]) -> str | None:
+    """The first of these files that is no longer as it was."""
+    for name, *then in known:
+        file = Path(name)
+        if not file.is_file() or [*stamp(file)[1:]] != then:
+            return name
+    return None
+
+
+def _source(target: Any) -> tuple[str, tuple[Stamp, ...]]:
     function = target.function if isinstance(target, Route) else target
     module = sys.modules.get(getattr(function, "__module__", None) or "")
     name, file = getattr(module, "__name__", ""), getattr(module, "__file__", None)
     if file is None or not Path(file).is_file():
-        return hashlib.sha256(f"{name}.{getattr(function, '__qualname__', '')}".encode()).hexdigest()
+        return hashlib.sha256(f"{name}.{getattr(function, '__qualname__', '')}".encode()).hexdigest(), ()
     return _digest(Path(file).resolve(), name)
 
 
 @cache
-def _digest(path: Path, module: str) -> str:
+def _digest(path: Path, module: str) -> tuple[str, tuple[Stamp, ...]]:
     alone = module.startswith("_routes_")  # a file that was named, see bench.imported
     root = path.parent if alone else path.parents[module.count(".") + (path.name == "__init__.py")]
     summed = hashlib.sha256()
     files = closure(path, root, None if alone else module.partition(".")[0])
+    known = tuple(stamp(file) for file in sorted(files))  # first: what is written while it is read shows later
     for name, source in sorted((file.name, file.read_bytes()) for file in files):  # wherever they are installed
         summed.update(name.encode() + b"\0" + source + b"\0")
-    return summed.hexdigest()
+    return summed.hexdigest(), known
 
 
 def closure(path: Path, root: Path, top: str | None) -> set[Path]:

@@ -194,6 +194,7 @@ LCURVE = (
     Column("iterations", "INTEGER", "1", "of the optimizer"),
     Column("forward_solves", "INTEGER", "1", "they took"),
     Column("chosen", "TEXT", "", "corner, discrepancy, or both"),
+    Column("ended", "TEXT", "", "why the optimizer stopped there"),
 )
 TRADEOFF = (
     *RUN,

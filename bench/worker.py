@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from bench.accuracy import Found
     from bench.case import ProblemSpec, RouteSpec
     from bench.rows import Row
+    from bench.sources import Stamp
     from bench.workbench import Settings
 
 
@@ -52,11 +53,14 @@ class Measure:
     settings: Settings
     row: Row
     found: Found
+    witnesses: tuple[Stamp, ...] = ()
 
     def __call__(self, channel: Channel) -> None:
+        """Files that have changed since the runner took their key end it: a row must not stand under another's name."""
         from bench.environment import environment
         from bench.measurement import measure
-        from bench.outcome import FOREIGN, Outcome, unbuilt
+        from bench.outcome import FOREIGN, Outcome, outdated, unbuilt
+        from bench.sources import changed
         from bench.workbench import Workbench
         from problems.errors import DomainError, InputError
 
@@ -74,6 +78,10 @@ class Measure:
         measured = measure(bench, self.route, row, lambda phase, row: channel.say("known", (phase, dict(row))))
         if not isinstance(measured, Outcome):
             measured = measured.in_turns(channel)
+        file = changed(self.witnesses)
+        if file is not None:
+            channel.say("done", (Outcome(outdated(row, file)), {}))
+            return
         channel.say("done", (measured, bench.judges.found))
 
 

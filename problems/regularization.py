@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from problems.problem import Array
 Phi = Literal["tikhonov", "tv", "amplitude"]
 FieldPhi = Literal["tikhonov", "tv"]
 WIDTH = 0.01  # of a jump of log E: 1 %
-Alpha = Annotated[float, "weight of Phi"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,8 @@ import shlex
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,8 @@ import pytest
 
 from bench import case
 from bench.inversion.invert import Engine, Inversion, invert
-from bench.inversion.lcurve import l_curve
+from bench.inversion.lcurve import Point, chosen, l_curve
+from bench.inversion.minibatch import minibatched
 from bench.inversion.objective import Objective
 from bench.inversion.one_shot import one_shot
 from bench.inversion.optimizers import Limits
@@ -52,6 +55,19 @@ def test_finite_differences_take_the_same_steps_at_the_predicted_price(bar: Inve
         assert one.distance == pytest.approx(other.distance, abs=1e-6)
         assert other.forward_solves == 17 * one.forward_solves  # 2 n_p, and one for J
     np.testing.assert_allclose(by_fd.p, bar.p, atol=1e-6)
+
+
+def test_a_trust_region_shows_steps_that_it_takes_only() -> None:
+    found = inverted("bar[n=20,sensors=20,noise=1e-2]", optimizer="trust", limits=Limits(60, 1e-6))
+    assert all(step.step_length > 0.0 for step in found.iterates[1:])
+    assert (np.diff([step.objective for step in found.iterates]) < 0).all()
+
+
+@pytest.mark.parametrize("optimizer", ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"])
+def test_iterations_are_accepted_steps(optimizer: str) -> None:
+    found = inverted("bar[n=3,sensors=3,noise=0.01,alpha=1e-3]", optimizer=optimizer, limits=Limits(2, 0.0, rate=0.01))
+    assert len(found.iterates) == 3
+    assert "not converged after 2 iterations" in found.end
 
 
 @pytest.mark.parametrize("optimizer", ["gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"])
@@ -136,8 +152,7 @@ def test_where_u_is_affine_in_p_one_solve_is_the_answer(problem: str) -> None:
     assert np.linalg.norm(gradient) < 1e-7 * np.linalg.norm(objective.accepted.gradient)
 
 
-def test_the_l_curve_bends_at_the_noise() -> None:
-    """Many data, few parameters: below the corner the misfit stays, above it Phi falls."""
+def test_the_discrepancy_principle_takes_the_largest_alpha_that_meets_the_noise() -> None:
     (spec,), (route,) = case.problems(["bar[n=6,sensors=6,noise=0.003,seed=3]"]), case.routes(["adjoint"])
     points = l_curve(spec, route, Engine(limits=Limits(200, 1e-8)), np.geomspace(1e-7, 1.0, 8))
     alphas, misfits, phis = (np.array([p.row[name] for p in points]) for name in ("alpha", "misfit", "phi"))
@@ -150,29 +165,66 @@ def test_the_l_curve_bends_at_the_noise() -> None:
     assert points[points.index(met[0]) - 1].discrepancy > 1.0
 
 
+@dataclass(frozen=True)
+class At:
+    """As much of an inversion as a point of an L-curve takes."""
+
+    alpha: float
+    end: str = "converged"
+
+
+def bent(ends: Sequence[str] = ()) -> list[Point]:
+    """log misfit = max(a, 0), log Phi = max(-a, 0), rounded: an L in log alpha = a, its corner at a = 0."""
+    a = np.linspace(3.0, -3.0, 13)
+    misfit, phi = (np.exp(np.logaddexp(0.0, 4.0 * side * a) / 4.0) for side in (1.0, -1.0))
+    ends = ends or ["converged"] * len(a)
+    points = zip(a, misfit, phi, ends, strict=True)
+    return [Point(At(np.exp(t), end), m, f, None, None) for t, m, f, end in points]
+
+
+def test_the_corner_is_where_an_l_bends_and_a_curve_bent_the_other_way_has_none() -> None:
+    marked = chosen(bent())
+    (corner,) = [k for k, point in enumerate(marked) if point.chosen == "corner"]
+    assert corner == 6
+    outward = [replace(point, misfit=1 / point.phi, phi=1 / point.misfit) for point in bent()]
+    assert not any(point.chosen for point in chosen(outward))
+
+
+def test_what_has_not_converged_is_no_point_of_the_curve() -> None:
+    ends = ["converged"] * 6 + ["not converged after 1 iterations"] + ["converged"] * 6
+    assert [k for k, point in enumerate(chosen(bent(ends))) if point.chosen] != [6]
+
+
 def test_bias_falls_and_variance_rises_as_regularization_goes() -> None:
+    """Their sum is the mean square distance of the draws to the truth, each inverted by itself."""
     (spec,), (route,) = case.problems(["bar[n=6,sensors=6,noise=0.003]"]), case.routes(["adjoint"])
-    trades = trade_off(spec, route, Engine(limits=Limits(200, 1e-6)), [1e-1, 1e-3, 1e-5], 6)
+    engine = Engine(limits=Limits(200, 1e-8))
+    trades = trade_off(spec, route, engine, [1e-1, 1e-3, 1e-5], 6)
     bias, variance, total = ([trade.row[name] for trade in trades] for name in ("bias", "variance", "total"))
     assert bias[0] > 3 * bias[1]
     assert variance[0] < variance[1] < variance[2]
-    np.testing.assert_allclose(np.add(bias, variance), total, rtol=1e-14)
+    alone = [
+        inverted(f"bar[n=6,sensors=6,noise=0.003,seed={k},alpha=1e-3]", limits=Limits(200, 1e-8)) for k in range(6)
+    ]
+    apart = np.mean([np.mean((found.p - found.truth) ** 2) for found in alone])
+    assert total[1] == pytest.approx(apart, rel=1e-5)
 
 
 def test_minibatches_of_load_cases_are_unbiased() -> None:
-    """The mean over the cases of what a batch of one gives is the gradient of J."""
-    (spec,), (route,) = case.problems(["block[n=2,cases=3,alpha=1e-3,data=twin]"]), case.routes(["adjoint"])
-    problem = spec()
-    p = problem.parameters.start + 0.1 * np.random.default_rng(0).uniform(-1, 1, 8)
-    g, by_prior = gradient_of(problem, route, p), problem.regularization.gradient(p)
-    parts = [gradient_of(part, route, p) - by_prior for part in problem.load_cases()]
-    np.testing.assert_allclose(np.sum(parts, axis=0) + by_prior, g, rtol=1e-9, atol=1e-12 * np.abs(g).max())
+    """Steps of Adam by all three cases are those by the whole of J; one case at a time comes down, too."""
+    problem = "block[n=2,cases=3,alpha=1e-3,data=twin]"
+    (spec,), (route,) = case.problems([problem]), case.routes(["adjoint"])
+    made = spec()
 
+    def run(count: int | None, steps: int) -> Inversion:
+        engine = Engine("adam", Limits(steps, 1e-8, rate=0.05))
+        batches = None if count is None else minibatched(made, route, engine, count, seed=1)
+        return invert(spec, route, engine, made=made, run=batches)
 
-def gradient_of(problem, route, p):
-    from routes.model import Model
-
-    return route.route.prepare(Model(problem), p, **route.options)(p).gradient
+    whole, all_three, one = run(None, 6), run(3, 6), run(1, 30)
+    np.testing.assert_allclose(all_three.p, whole.p, rtol=1e-6, atol=1e-9)
+    assert one.iterates[-1].objective < 0.7 * one.iterates[0].objective
+    assert [step.iteration for step in one.iterates] == [*range(11)], "the whole is looked at once an epoch"
 
 
 def test_rows_are_kept_and_resumed(cli) -> None:
@@ -188,6 +240,8 @@ def test_rows_are_kept_and_resumed(cli) -> None:
     last = [row for row in again.rows if row["table"] == "estimates"]
     assert [row["blind"] for row in last] == [0] * 5 + [1] * 3
     assert max(abs(row["estimate"] - row["truth"]) for row in last[:5]) < 1e-6
+    other = cli("invert", "--problem", "bar", "--resume", "--route", "tangent")
+    assert (other.code, "holds no run of bar by tangent" in other.err) == (2, True), "another question"
 
 
 def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
@@ -217,6 +271,7 @@ def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
         (("--positive", "log"), "a log field is positive already"),
         (("--optimizer", "levenberg-marquardt"), "5 data for 8 parameters"),
         (("--resume",), "no such file"),
+        (("--resume", "--alpha-sweep", "1e-3", "1", "3"), "is of a single inversion"),
         (("--resume", "--no-store"), "there is none"),
         (("--route", "adjoint", "--route", "tangent", "--alpha-sweep", "1e-3", "1", "3"), "name one"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import sqlite3
 import subprocess
@@ -10,7 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from conftest import Ran, with_routes
+from conftest import Ran, shell, with_routes
 
 from bench import environment, keys, sources
 from bench.resume import state_of
@@ -231,3 +232,24 @@ def test_a_row_of_an_older_schema_is_missing(plugin: Path) -> None:
         db.commit()
     assert ran(plugin, "--resume") == ALL
     assert ran(plugin, "--resume") == []
+
+
+WATCH = """from pathlib import Path
+import model
+
+
+class Model(model.Model):
+    def value(self, p):
+        here = Path(__file__)
+        here.write_text(here.read_text() + "#")
+        return super().value(p)
+"""
+
+
+def test_a_source_that_changes_while_it_runs_gives_no_row_under_its_old_name(plugin: Path) -> None:
+    """What ran of the other code is no answer of this one."""
+    (plugin / "watch.py").write_text(WATCH)
+    done = shell("routes run --json --no-timing --problem watch.py:Model --route fd-central", plugin)
+    row = json.loads(done.stdout)
+    assert row["status"] == "failed"
+    assert "watch.py has changed since the run began - run it again" in row["reason"]

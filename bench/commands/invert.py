@@ -8,27 +8,25 @@ from typing import TYPE_CHECKING
 import click
 
 from bench.commands.limited import confined
-from bench.commands.shared import SELECTOR, at_option, debug_option, solver_options, store_options
+from bench.commands.shared import SELECTOR, at_option, debug_option, refuse_given, solver_options, store_options
 from bench.commands.studying import echo_json, json_option, keep, no_plot_option, one_problem, problem_option, writable
 from problems.errors import InputError
 
 if TYPE_CHECKING:
-    from bench.case import ProblemSpec
     from bench.inversion.optimizers import Name
     from bench.inversion.variables import Positive
-    from problems.problem import Array
     from routes.newton import Solver
 
 POSITIVES = ["none", "log", "softplus"]
 OPTIMIZERS = ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 OPTIMIZER = "gauss-newton, levenberg-marquardt and trust use d(S u)/dp; descent: to watch; adam: for --minibatch."
-TOLERANCE = "End where |dJ/dp| is so much of that at the start."
+TOLERANCE = "End where |dJ/dp| is so much of that where the run begins."
 POSITIVE = "What keeps a raw parameter > 0: varied is its logarithm, or softplus's argument."
 ALPHA_SWEEP = "J minimized at COUNT weights of Phi from LEAST to MOST: the L-curve."
 DRAWS = "The same for so many draws of the noise: bias and variance against alpha."
 MINIBATCH = "Gradients of so many load cases at a time, drawn at random, for adam."
 RATE = "Of adam's steps, in natural changes of p."
-RESUME = "From where the last run of the same in the store ended."
+RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 
 
 @click.command()
@@ -38,9 +36,7 @@ RESUME = "From where the last run of the same in the store ended."
 @click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help=OPTIMIZER)
 @click.option("--iterations", type=int, default=200, show_default=True, help="At most.")
 @click.option("--tolerance", type=float, default=1e-8, show_default=True, help=TOLERANCE)
-@click.option(
-    "--positive", type=click.Choice(["none", "log", "softplus"]), default="none", show_default=True, help=POSITIVE
-)
+@click.option("--positive", type=click.Choice(POSITIVES), default="none", show_default=True, help=POSITIVE)
 @click.option("--alpha-sweep", type=(float, float, int), metavar="LEAST MOST COUNT", help=ALPHA_SWEEP)
 @click.option("--draws", type=int, metavar="N", help=DRAWS)
 @click.option("--minibatch", type=int, metavar="K", help=MINIBATCH)
@@ -96,9 +92,10 @@ def invert(
     engine = Engine(optimizer, Limits(iterations, tolerance, rate), solver, positive)
     run = Run(spec, specs, engine, at, quiet=as_json, plots=not no_plot)
     if alpha_sweep is not None:
+        refuse_given(("resume", "minibatch"), "is of a single inversion, not of an --alpha-sweep")
         tables = run.sweep(alpha_sweep, draws)
     else:
-        tables = run.each(_resumed(kept, spec) if resume else None, minibatch, seed)
+        tables = run.each(_resumed(kept) if resume else None, minibatch, seed)
     if as_json:
         echo_json(tables)
     keep(kept, tables, run.started, quiet=as_json)
@@ -133,10 +130,8 @@ def _check(
         )
 
 
-def _resumed(kept: Path | None, spec: ProblemSpec) -> tuple[Array, int]:
-    """The last estimate of the same problem in the store, and the iterations behind it. Raises InputError."""
-    from bench.inversion.resumed import last_estimate
-
+def _resumed(kept: Path | None) -> Path:
+    """Raises InputError where there is no store to look into."""
     if kept is None:
         raise InputError("--resume: looks into a store, with --no-store there is none - leave one of them out")
-    return last_estimate(kept, spec)
+    return kept

@@ -10,6 +10,8 @@ from bench.units import now
 from problems.errors import InputError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
 
     from bench.case import ProblemSpec, RouteSpec
@@ -34,19 +36,20 @@ class Run:
         self.one_shot: float | None = None
         self.out: Console = console(stderr=quiet)
 
-    def each(
-        self, start: tuple[Array, int] | None, minibatch: int | None, seed: int
-    ) -> dict[str, list[dict[str, Any]]]:
-        """Route by route, then what each has paid."""
+    def each(self, resumed: Path | None, minibatch: int | None, seed: int) -> Tables:
+        """Route by route, from where each ended in the store `resumed` if given; then what each has paid."""
         from bench.inversion.invert import invert
         from bench.inversion.minibatch import minibatched
+        from bench.inversion.resumed import last_estimate
         from bench.views import inversion as view
 
         problem = self.spec()
+        starts: list[tuple[Array | None, int]] = [(None, 0)] * len(self.routes)
+        if resumed is not None:  # what is not there is refused before anything runs
+            starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
         self._baseline(problem)
         done: list[Inversion] = []
-        p, offset = start or (None, 0)
-        for route in self.routes:
+        for route, (p, offset) in zip(self.routes, starts, strict=True):
             if self.interrupted:
                 break
             self._title(route, problem.truth() is not None)
@@ -94,7 +97,8 @@ class Run:
         """The one-shot answer, where there is one: what the loop has to beat."""
         from bench.inversion.one_shot import of_problem
 
-        if not problem.affine:
+        route = self.routes[0]
+        if self.quiet or not problem.affine or route.route.objection(problem, **route.options) is not None:
             return
         prior = problem.regularization
         if prior is not None and prior.kind == "tv" and prior.alpha:
@@ -102,7 +106,7 @@ class Run:
                 lambda: self.out.print("u is affine in p, but total variation is not quadratic: no one-shot answer")
             )
             return
-        found = of_problem(problem, self.routes[0], self.engine, self.at)
+        found = of_problem(problem, route, self.engine, self.at)
         self.one_shot = found.J
         self._say(
             lambda: self.out.print(

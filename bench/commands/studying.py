@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import complain
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ def echo_json(tables: Mapping[str, Sequence[Row]]) -> None:
 
 
 def keep(kept: Path | None, tables: Mapping[str, Sequence[Row]], started: str, quiet: bool) -> None:
-    """Rows of a study into the store, and a line that says so, or that they are lost."""
+    """Rows of a study into the store, and a line that says so. Raises InputError where they are lost: last of all."""
     from bench.store import Store
 
     if kept is None:
@@ -60,8 +59,7 @@ def keep(kept: Path | None, tables: Mapping[str, Sequence[Row]], started: str, q
     try:
         Store(kept).append_study(tables, started)
     except InputError as error:
-        complain(f"not kept: {error}")
-        return
+        raise InputError(f"not kept: {error}") from error
     if not quiet:
         from bench.views.tables import console
 

@@ -47,7 +47,9 @@ def interleaved(cases: Iterable[Running]) -> Iterator[Outcome]:
             hungry = [case for case in hungry if case.turn()]
         count = len(waiting)
         while waiting:
-            yield waiting.pop(0).outcome(count)
+            outcome = waiting[0].outcome(count)  # still among those that are closed if this is interrupted
+            waiting.pop(0)
+            yield outcome
     finally:
         for case in waiting:
             case.close()

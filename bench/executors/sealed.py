@@ -32,6 +32,7 @@ class Sealed:
 
     def __call__(self, channel: Channel) -> None:
         from bench.environment import environment
+        from bench.keys import witnesses
         from bench.outcome import Outcome, failed
         from bench.worker import Measure
 
@@ -45,7 +46,7 @@ class Sealed:
             channel.say("done", (Outcome(row), {}))
             return
         row = self.row | {"prepare_s": -checked_s}  # at home nobody checks: it is no part of the preparation
-        Measure(problem, route, settings, row, self.found)(channel)
+        Measure(problem, route, settings, row, self.found, witnesses(problem, route, settings.at))(channel)
 
     def _check(self, problem: ProblemSpec, route: RouteSpec, at: str) -> float:
         """The seconds it took. Raises InputError where this host would compute something else."""

@@ -11,6 +11,7 @@ from bench.inversion.objective import OUTSIDE, Objective
 from problems.problem import Array
 
 STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of x, which is of size one
+AT_MINIMUM = "J cannot be told apart from its minimum"
 DISAGREE = 1e-2  # relative difference of slopes that no such difference explains
 
 
@@ -55,7 +56,7 @@ def explained(objective: Objective) -> str:
             "predicted decrease and actual decrease disagree: the gradient is inconsistent with J (slope"
             f" {found.promised:.4g} promised, {found.found:.4g} by differences of J); see routes vcurve"
         )
-    return "J cannot be told apart from its minimum: what is left of the slope is rounding"
+    return f"{AT_MINIMUM}: what is left of the slope is rounding"
 
 
 def _central(objective: Objective, x: Array, v: Array, h: float) -> float | None:

@@ -41,7 +41,7 @@ class History:
     watch: Watch = lambda iterate: None
     iterates: list[Iterate] = field(default_factory=list)
     offset: int = 0  # iterations of a run that this one resumes
-    best: Evaluation | None = None
+    last: Evaluation | None = None
 
     def take(self, found: Evaluation, says: str | None = None) -> None:
         """An accepted step; steps that had to come back on the way are said."""
@@ -65,7 +65,7 @@ class History:
             says,
         )
         self.iterates.append(iterate)
-        self.best = found
+        self.last = found
         self.watch(iterate)
 
     def distance(self, p: Array) -> float | None:

@@ -141,8 +141,8 @@ def invert(
             if not history.iterates:
                 raise
             end, interrupted = "interrupted", True
-    best = history.best
-    assert best is not None
+    last = history.last
+    assert last is not None
     return Inversion(
         spec.name,
         spec.options,
@@ -157,13 +157,13 @@ def invert(
         tuple(history.iterates),
         problem,
         p_0,
-        best.p,
-        best.gradient,
+        last.p,
+        last.gradient,
         truth,
-        view(problem, best),
+        view(problem, last),
         end,
         interrupted,
-        variables.warning(data(problem, best.p)),
+        variables.warning(data(problem, last.p)),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
     )
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.case import ProblemSpec, RouteSpec
+from bench.inversion.diagnosis import AT_MINIMUM
 from bench.inversion.invert import Engine, Inversion, invert
 from bench.rows import Row
 from problems.errors import InputError
 from problems.problem import Array, Problem
-from routes.model import Model
 
 BENT = 3  # points that a curvature takes
 
@@ -30,11 +30,16 @@ class Point:
     chosen: str | None = None
 
     @property
+    def converged(self) -> bool:
+        """Whether it is a minimum, to the tolerance or to rounding: others are no points of the curve."""
+        return self.inversion.end.startswith(("converged", AT_MINIMUM))
+
+    @property
     def row(self) -> Row:
         last = self.inversion.iterates[-1]
         own = {name: getattr(self, name) for name in ("misfit", "phi", "curvature", "discrepancy", "chosen")}
         counts = {"iterations": last.iteration, "forward_solves": last.forward_solves, "distance": last.distance}
-        return self.inversion.shared | own | counts
+        return self.inversion.shared | own | counts | {"ended": self.inversion.end}
 
 
 def l_curve(
@@ -61,12 +66,12 @@ def l_curve(
         watch(found[-1])
         if found[-1].interrupted:
             break
-    return chosen([_point(each, engine) for each in found])
+    return chosen([_point(each) for each in found])
 
 
-def _point(inversion: Inversion, engine: Engine) -> Point:
+def _point(inversion: Inversion) -> Point:
     last, problem, p = inversion.iterates[-1], inversion.made, inversion.p
-    seen = problem.observation(Model(problem, engine.solver).solve(p).u, p)
+    seen = problem.observation(problem.initial(p), p)  # noise and number of the data, whatever the state
     discrepancy = None
     if seen is not None and seen.sigma > 0.0:
         discrepancy = math.sqrt(2.0 * last.misfit) / (seen.sigma * math.sqrt(len(seen.data)))
@@ -77,9 +82,9 @@ def chosen(points: list[Point]) -> list[Point]:
     """With curvatures; the corner is where the curve bends most, the discrepancy principle's choice the largest alpha
     whose misfit is no more than noise makes (Morozov 1966).
     """
-    bends = curvatures(points)
+    bends = [bend if point.converged else None for bend, point in zip(curvatures(points), points, strict=True)]
     corner = max((k for k, bend in enumerate(bends) if bend is not None), key=lambda k: bends[k] or 0.0, default=None)
-    met = [k for k, point in enumerate(points) if point.discrepancy is not None and point.discrepancy <= 1.0]
+    met = [k for k, p in enumerate(points) if p.converged and p.discrepancy is not None and p.discrepancy <= 1.0]
     marks: dict[int, list[str]] = {k: [] for k in range(len(points))}
     if corner is not None and (bends[corner] or 0.0) > 0.0:
         marks[corner].append("corner")

@@ -17,6 +17,7 @@ from routes.sensitivity import Sensitivity
 
 WALL = 30.0  # times the residuals of the last step, where J is not defined: no region can be trusted there
 LSMR = {"regularize": False, "atol": 1e-8, "btol": 1e-8}  # whole Gauss-Newton steps
+TRIALS = 20  # evaluations an iteration, at most
 TIGHT = 1e-15  # SciPy's own tolerances: when to stop is ours to say
 
 
@@ -129,9 +130,12 @@ def _by_least_squares(objective: Objective, history: History, limits: Limits, de
         if not np.array_equal(x, objective.accepted.x):
             objective.tried.append(residuals.evaluated(x, by_x))
             accept(objective, history, limits, x)
+            if len(history.iterates) > limits.iterations:
+                raise Ended(spent(limits))
         return by_x
 
-    tolerances: Any = {"xtol": TIGHT, "ftol": TIGHT, "gtol": TIGHT, "max_nfev": limits.iterations}
+    most = TRIALS * limits.iterations  # steps that come back are no iterations
+    tolerances: Any = {"xtol": TIGHT, "ftol": TIGHT, "gtol": TIGHT, "max_nfev": most}
     try:
         result: Any = least_squares(residuals, start_of(objective), jac=jac, **tolerances, **method)
     except Ended as end:
@@ -153,7 +157,13 @@ def trust(objective: Objective, history: History, limits: Limits) -> str:
         A = known[x.tobytes()]
         return np.asarray(A.rmatvec(A.matvec(v))) / objective.J_0
 
-    watch = Watching(lambda x: accept(objective, history, limits, x))
+    def take(x: Array) -> None:
+        """SciPy tells of steps that it rejects, too: it has not moved then."""
+        assert objective.accepted is not None
+        if not np.array_equal(x, objective.accepted.x):
+            accept(objective, history, limits, x)
+
+    watch = Watching(take)
     more: Any = {"callback": watch, "options": {"maxiter": limits.iterations, "gtol": 0.0}}
     result: Any = minimize(objective, start_of(objective), jac=True, hessp=hessp, method="trust-ncg", **more)
     return watch.end or (spent(limits) if result.status == 1 else explained(objective))

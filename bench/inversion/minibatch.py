@@ -10,7 +10,7 @@ from bench.case import RouteSpec
 from bench.inversion.history import History
 from bench.inversion.invert import Engine
 from bench.inversion.objective import Objective
-from bench.inversion.optimizers import Limits, adam
+from bench.inversion.optimizers import Ended, Limits, adam
 from problems.errors import InputError
 from problems.problem import Array, Problem
 
@@ -41,10 +41,14 @@ def minibatched(problem: Problem, route: RouteSpec, engine: Engine, count: int, 
             if prior is not None:
                 Phi, theta, by_p = prior
                 by_prior = Phi.gradient(theta) * by_p * objective.variables.slope(x)
-            drawn = rng.choice(len(parts), count, replace=False)
-            by_cases = [parts[k].at(x).by_x - by_prior for k in drawn]
+            by_cases = []
+            for k in rng.choice(len(parts), count, replace=False):
+                found = parts[k].accept(x)
+                if found.outside is not None:
+                    raise Ended(f"stopped outside: {found.outside} - take a smaller --rate")
+                by_cases.append(found.by_x - by_prior)
             return np.asarray(len(parts) / count * np.sum(by_cases, axis=0) + by_prior)
 
-        return adam(objective, history, limits, batch)
+        return adam(objective, history, limits, batch, every=-(-len(parts) // count))  # once an epoch
 
     return run

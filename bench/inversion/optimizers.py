@@ -78,24 +78,32 @@ def descent(objective: Objective, history: History, limits: Limits) -> str:
     return spent(limits)
 
 
-def adam(objective: Objective, history: History, limits: Limits, batch: Callable[[Array], Array] | None = None) -> str:
+def adam(
+    objective: Objective,
+    history: History,
+    limits: Limits,
+    batch: Callable[[Array], Array] | None = None,
+    every: int = 1,
+) -> str:
     """Adam (Kingma & Ba 2015), optax's: no line search, so that gradients of parts of J will do.
 
-    `batch`: dJ/dx of a random part of the load cases; None: the whole.
+    `batch`: dJ/dx of a random part of the load cases, the whole being looked at `every` so many steps; None: the whole.
     """
     import optax
 
     rule = optax.adam(limits.rate)
     x = start_of(objective)
     state: Any = rule.init(x)
-    for _ in range(limits.iterations):
-        g = objective(x)[1] if batch is None else batch(x) / objective.J_0
-        step, state = rule.update(g, state, x)
-        x = np.asarray(x + step, dtype=np.float64)
-        found = objective.at(x)
-        if found.outside is not None:
-            return f"stopped outside: {found.outside} - take a smaller --rate"
+    for k in range(1, limits.iterations + 1):
         try:
+            g = objective(x)[1] if batch is None else batch(x) / objective.J_0
+            step, state = rule.update(g, state, x)
+            x = np.asarray(x + step, dtype=np.float64)
+            if k % every and k < limits.iterations:
+                continue
+            found = objective.at(x)
+            if found.outside is not None:
+                raise Ended(f"stopped outside: {found.outside} - take a smaller --rate")
             accept(objective, history, limits, x)
         except Ended as end:
             return str(end)

@@ -7,29 +7,44 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.case import ProblemSpec
-from bench.rows import clean
+from bench.case import ProblemSpec, RouteSpec
+from bench.rows import Row, clean
 from bench.store import Store
 from problems.errors import InputError
 from problems.problem import Array
 
 
-def last_estimate(path: Path, spec: ProblemSpec) -> tuple[Array, int]:
-    """p (n_p,) of the newest estimates of this problem with these options, and the iterations behind them.
-
-    Raises InputError where there are none.
+def last_estimate(path: Path, spec: ProblemSpec, route: RouteSpec, optimizer: str, at: str) -> tuple[Array, int]:
+    """p (n_p,) at the end of the newest run of the same: problem, alpha, route, options, optimizer, start; and the
+    iterations behind it. Raises InputError where there is none.
     """
     store = Store(path)
-    names, records = store.table("estimates")
-    rows = [dict(zip(names, record, strict=True)) for record in records]
-    same = [
-        row for row in rows if row["problem"] == spec.name and json.loads(row["problem_options"]) == clean(spec.options)
-    ]
+    asked = {
+        "problem": spec.name,
+        "problem_options": clean(spec.options),
+        "alpha": float(spec.options.get("alpha") or 0.0),
+        "route": route.name,
+        "route_options": clean(route.options),
+        "optimizer": optimizer,
+        "at": at,
+    }
+    same = [row for row in _records(store, "estimates") if all(row[name] == value for name, value in asked.items())]
     if not same:
-        raise InputError(f"--resume: store {path} holds no inversion of {spec.name} with these options - leave it out")
+        raise InputError(
+            f"--resume: store {path} holds no run of {spec.name} by {route.name}, {optimizer}, with these options"
+            " - leave it out"
+        )
     study, label = same[-1]["study_id"], same[-1]["label"]
     p = np.array([row["estimate"] for row in same if (row["study_id"], row["label"]) == (study, label)])
-    names, records = store.table("inversion")
-    steps = [dict(zip(names, record, strict=True)) for record in records]
+    steps = _records(store, "inversion")
     before = [row["iteration"] for row in steps if (row["study_id"], row["label"]) == (study, label)]
     return p, max(before, default=0)
+
+
+def _records(store: Store, table: str) -> list[Row]:
+    names, records = store.table(table)
+    rows = [dict(zip(names, record, strict=True)) for record in records]
+    return [
+        row | {name: json.loads(row[name]) for name in ("problem_options", "route_options") if row[name] is not None}
+        for row in rows
+    ]

@@ -120,7 +120,7 @@ class Confined:
         if not ended:
             return Ending("crashed", f"it hung up and was still running {GRACE:g} s later")
         code = self.process.wait()
-        if any(word.encode() in self._stderr for word in EXHAUSTED):
+        if any(word in self._last_line() for word in EXHAUSTED) and code != -signal.SIGSEGV:
             cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
             return Ending("out-of-memory", f"an allocation failed within --memory{cap}: {self._last_line()}")
         if code >= 0:

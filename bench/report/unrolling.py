@@ -9,8 +9,6 @@ from bench.report.style import of_route, variant
 from bench.rows import Row
 from bench.views.format import bytes_
 
-CURVE = ("inner", "checkpoint")
-
 
 def section(source: Source) -> Section | None:
     rows = [row for row in source.table("unrolling") if row["iterations"] is not None]

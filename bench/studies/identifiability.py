@@ -92,7 +92,7 @@ class Identified:
     @property
     def kinds(self) -> Array:
         """blind, weak or seen, (n_p,)."""
-        weak = self.svd.norms <= self.threshold
+        weak = np.hypot(self.svd.norms, self.svd.beyond) <= self.threshold  # what products have left out could be there
         return np.where(self.svd.blind, "blind", np.where(weak, "weak", "seen"))
 
     @property

@@ -44,7 +44,7 @@ def table(points: Sequence[Point]) -> Table:
             number(row["distance"], 3),
             str(row["iterations"]),
             str(row["forward_solves"]),
-            row["chosen"] or "",
+            row["chosen"] or ("" if point.converged else "not converged"),
         )
     return out
 
