@@ -28,6 +28,7 @@ from bench.commands.vcurve import vcurve
 from problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+READING = ("compare", "baseline", "status", "report", "export")  # verbs that fail by what they are given only
 KEEPING = ("run", "tolerance", "scaling", "invert")  # verbs that an interrupt does not rob of what they have
 
 
@@ -70,7 +71,7 @@ class Routes(click.Group):
             if ctx.obj == INSIDE and status_of(failure) == "out-of-memory":
                 raise  # the process that watches this one says and keeps it
             complain(f"{ctx.invoked_subcommand}: {one_line(failure)} - see --debug")
-            ctx.exit(FAILED)
+            ctx.exit(WRONG_USAGE if ctx.invoked_subcommand in READING else FAILED)
 
 
 def leave(code: int) -> NoReturn:

@@ -83,7 +83,7 @@ def read(path: Path) -> tuple[Expectation, ...]:
         raise InputError(f"{path}: {error.strerror or error} - name a file of [[expected]] entries") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is no text: {error.reason} at byte {error.start} - write TOML") from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path}: is no TOML: {error} - mend it there") from error
     unknown = [key for key in content if key != "expected"]
     if unknown:

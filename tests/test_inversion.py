@@ -25,6 +25,7 @@ from bench.inversion.optimizers import Limits
 from bench.inversion.tradeoff import trade_off
 from bench.inversion.variables import Variables
 from bench.store import Store
+from problems.problem import Linearization, Offers, Parameters, Problem
 from routes.newton import Solver
 
 TIGHT = Limits(200, 1e-12)
@@ -112,6 +113,92 @@ def test_one_sided_differences_stall_where_their_error_is_all_there_is() -> None
     found = inverted("bar", "fd-one-sided")
     assert "the gradient is inconsistent with J" in found.end
     assert np.abs(found.p[:5] - found.truth[:5]).max() > 1e-10
+
+
+class Bowl(Problem):
+    """u = p, J = a curved valley through the eyes of `seen`; R_u = 1."""
+
+    name, offers, structure, linear, n_state = "bowl", Offers.LINEARIZE, "spd", True, 2
+
+    def __init__(self, seen=lambda J, p: J) -> None:
+        self.seen = seen
+        self.parameters = Parameters(start=np.array([-1.2, 1.0]), scale=np.ones(2))
+
+    def residual(self, u, p):
+        return u - p
+
+    def tangent(self, u, p):
+        return np.eye(2)
+
+    def objective(self, u, p):
+        return self.seen(100.0 * (u[1] - u[0] ** 2) ** 2 + (1.0 - u[0]) ** 2, u)
+
+    def linearize(self, u, p):
+        r = u[1] - u[0] ** 2
+        J_u = np.array([-400.0 * r * u[0] - 2.0 * (1.0 - u[0]), 200.0 * r])
+        return Linearization(-np.eye(2), J_u, np.zeros(2))
+
+
+NOISE = np.random.default_rng(0)
+
+
+@pytest.mark.parametrize(
+    ("seen", "says"),
+    [
+        (lambda J, p: J, "converged"),
+        (lambda J, p: round(J, 4), "noise of J, about"),
+        (lambda J, p: J + 1e-3 * NOISE.standard_normal(), "noise of J, about"),
+        (lambda J, p: J + 1e10, "J cannot be told apart from its minimum"),
+        (lambda J, p: J if p[0] < 0.5 else float("nan"), "is not defined"),
+        (lambda J, p: J + 5.0 * abs(p[0] - 0.3), "J has a kink here"),
+        (lambda J, p: J + 3.0 * p[0], "the gradient is inconsistent with J"),
+    ],
+    ids="smooth rounded noisy offset edge kink forgotten".split(),
+)
+def test_who_is_to_blame(seen, says: str) -> None:
+    """The gradient is right for the smooth J in all of these: it is blamed where J is smooth, and another's."""
+    spec = case.ProblemSpec("bowl", {}, lambda: Bowl(seen))
+    (route,) = case.routes(["adjoint"])
+    found = invert(spec, route, Engine(limits=Limits(300, 1e-9)))
+    assert says in found.end
+
+
+@pytest.mark.parametrize("size", [1e300, 1e-200])
+def test_sizes_at_the_ends_of_the_floating_point_numbers_are_no_minimum(size: float) -> None:
+    class Scaled(Bowl):
+        def linearize(self, u, p):
+            lin = super().linearize(u, p)
+            return Linearization(lin.R_p, size * lin.J_u, lin.J_p)
+
+    spec = case.ProblemSpec("scaled", {}, lambda: Scaled(lambda J, p: size * J))
+    (route,) = case.routes(["adjoint"])
+    found = invert(spec, route, Engine(limits=Limits(200, 1e-8)))
+    np.testing.assert_allclose(found.p, 1.0, atol=1e-5)
+
+
+def test_what_falls_without_bound_is_said_to() -> None:
+    class Hill(Bowl):
+        def linearize(self, u, p):
+            lin = super().linearize(u, p)
+            return Linearization(lin.R_p, -lin.J_u, lin.J_p)
+
+    spec = case.ProblemSpec("hill", {}, lambda: Hill(lambda J, p: -J))
+    (route,) = case.routes(["adjoint"])
+    assert "falls without bound" in invert(spec, route, Engine()).end
+
+
+def test_a_route_with_another_J_is_found_out_at_the_start() -> None:
+    found = inverted("advection[n=4,data=twin,alpha=1e-4]", "faulty-adjoint[fault=functional]", limits=Limits(3, 1e-8))
+    assert "is not that of the problem" in found.iterates[0].says
+    assert inverted("bar", limits=Limits(3, 1e-8)).iterates[0].says is None
+
+
+def test_a_zero_gradient_at_the_start_is_the_end() -> None:
+    (spec,), (route,) = case.problems(["bar"]), case.routes(["adjoint"])
+    for optimizer in ("lbfgs", "trust", "descent"):
+        found = invert(spec, route, Engine(optimizer), at="true")
+        assert len(found.iterates) == 1 or found.iterates[-1].objective <= found.iterates[0].objective
+        assert np.isfinite(found.p).all()
 
 
 def test_a_minimum_reached_to_rounding_blames_nobody() -> None:
@@ -271,6 +358,7 @@ def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
         (("--positive", "log"), "a log field is positive already"),
         (("--optimizer", "levenberg-marquardt"), "5 data for 8 parameters"),
         (("--resume",), "no such file"),
+        (("--alpha-sweep", "1", "1.0000001", "3"), "the same to six digits"),
         (("--resume", "--alpha-sweep", "1e-3", "1", "3"), "is of a single inversion"),
         (("--resume", "--no-store"), "there is none"),
         (("--route", "adjoint", "--route", "tangent", "--alpha-sweep", "1e-3", "1", "3"), "name one"),

@@ -41,6 +41,7 @@ class Run:
         from bench.inversion.invert import invert
         from bench.inversion.minibatch import minibatched
         from bench.inversion.resumed import last_estimate
+        from bench.inversion.variables import Variables
         from bench.views import inversion as view
 
         problem = self.spec()
@@ -52,8 +53,9 @@ class Run:
         for route, (p, offset) in zip(self.routes, starts, strict=True):
             if self.interrupted:
                 break
-            self._title(route, problem.truth() is not None)
             run = None if minibatch is None else minibatched(problem, route, self.engine, minibatch, seed)
+            Variables.of(problem.parameters, problem.parameters.start, self.engine.positive, problem.name)
+            self._title(route, problem.truth() is not None)
             found = invert(self.spec, route, self.engine, self.at, p, self._line, problem, run, offset)
             done.append(found)
             self.interrupted = found.interrupted
@@ -72,7 +74,11 @@ class Run:
 
         if len(self.routes) != 1:
             raise InputError(f"--alpha-sweep with {len(self.routes)} routes - name one, the answers are the same")
-        alphas, (route,) = [float(f"{a:.6g}") for a in np.geomspace(*given)], self.routes
+        alphas, (route,) = list(dict.fromkeys(float(f"{a:.6g}") for a in np.geomspace(*given))), self.routes
+        if len(alphas) < given[2]:
+            raise InputError(
+                f"--alpha-sweep {given[0]:.10g} {given[1]:.10g}: are the same to six digits - go further apart"
+            )
         if draws is not None:
             trades = trade_off(self.spec, route, self.engine, alphas, draws, self.at)
             if not self.quiet and trades:

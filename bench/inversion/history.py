@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bench.accuracy import norm2
 from bench.inversion.objective import Evaluation, Objective
 from problems.problem import Array
 
@@ -56,7 +57,7 @@ class History:
             found.J,
             misfit,
             regularization,
-            float(np.linalg.norm(found.gradient)),
+            norm2(found.gradient),
             None if moved is None else float(np.linalg.norm(moved)),
             self.objective.forward_solves,
             self.objective.adjoint_solves,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass, field
@@ -133,10 +134,15 @@ def invert(
     truth = problem.truth()
     history = History(objective, truth, p_0, watch, offset=offset)
     interrupted = False
-    with redirect_stdout(sys.stderr), np.errstate(all="ignore"):
+    with redirect_stdout(sys.stderr), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # what optimizers warn of is said at the end
         try:
-            history.take(objective.start(p))
-            end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
+            found = objective.start(p)
+            history.take(found, objective.doubt())
+            if objective.slope_0 == 0.0:
+                end = "converged: dJ/dp is 0 at the start"
+            else:
+                end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
         except KeyboardInterrupt:
             if not history.iterates:
                 raise

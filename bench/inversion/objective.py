@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.accuracy import norm2
 from bench.inversion.variables import Variables
 from problems.errors import DomainError, NotConverged, Overflow, SingularMatrix
 from problems.problem import Array, Problem
@@ -16,6 +17,7 @@ from routes.newton import Solver
 from routes.route import Options, Route
 
 OUTSIDE = (DomainError, NotConverged, SingularMatrix, Overflow, FloatingPointError)
+SAME = 1e-5  # of J: no tolerance of a forward solve
 STEEP = 10.0  # the wall's slope, in slopes of J at the last accepted step
 
 
@@ -58,7 +60,7 @@ class Objective:
         self._gradient = self.route.prepare(self.model, p, **options)
         self.accepted = self._evaluate(self.variables.x(p))
         self.J_0 = abs(self.accepted.J) or 1.0
-        self.slope_0 = float(np.linalg.norm(self.accepted.by_x))
+        self.slope_0 = norm2(self.accepted.by_x)
         return self.accepted
 
     def __call__(self, x: Array) -> tuple[float, Array]:
@@ -83,6 +85,15 @@ class Objective:
         self.accepted = self.at(x)
         self.tried = []
         return self.accepted
+
+    def doubt(self) -> str | None:
+        """What is odd about the J that the route returns at the start; a forward solve, or two, that nobody counts."""
+        assert self.accepted is not None
+        model, p, J = Model(self.problem, self._solver), self.accepted.p, self.accepted.J
+        own = model.value(p)
+        if abs(J - own) <= SAME * abs(own) or abs(model.value(p) - own) > 0.1 * abs(J - own):  # the same, or noise
+            return None
+        return f"J of the route, {J:.6g}, is not that of the problem, {own:.6g}: what it finds is another minimum"
 
     def misfit(self, found: Evaluation) -> tuple[float, float]:
         """1/2 |S u - d|^2 and alpha Phi."""
@@ -111,7 +122,7 @@ class Objective:
             J = self.model.value(p) if J is None else float(J)
         g = np.asarray(gradient, dtype=np.float64)
         if not (np.isfinite(J) and np.isfinite(g).all()):
-            raise FloatingPointError(f"{self.problem.name}: J or its gradient is not finite")
+            raise Overflow(f"{self.problem.name}: J = {J}, |dJ/dp| = {norm2(g)} at a step - choose another start")
         return Evaluation(x.copy(), p, J, g * self.variables.slope(x), g, u=u, lam=lam)
 
     def _wall(self, x: Array, why: str) -> Evaluation:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from bench.accuracy import norm2
 from bench.inversion.diagnosis import explained
 from bench.inversion.history import History
 from bench.inversion.objective import Objective
@@ -15,6 +16,7 @@ from problems.problem import Array
 
 Name = Literal["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 DIVERGED = 1e3  # times J at the start
+FALLEN = 1e6  # times that, below zero
 MEMORY = 20  # pairs of steps and changes of the gradient that L-BFGS keeps
 OUT_OF_ITERATIONS = 1  # L-BFGS-B's status; any other end is a line search that came back without a step
 
@@ -37,9 +39,11 @@ def accept(objective: Objective, history: History, limits: Limits, x: Array) -> 
     found = objective.at(x)
     history.take(found)
     objective.accept(x)
+    if found.J < -FALLEN * objective.J_0:
+        raise Ended(f"J falls without bound: J = {found.J:.3g} after {objective.J_0:.3g} - it is no sum of squares")
     if found.J > DIVERGED * objective.J_0:
         raise Ended(f"diverging: J = {found.J:.3g} is {found.J / objective.J_0:.3g} times that of the start")
-    if float(np.linalg.norm(found.by_x)) <= limits.tolerance * objective.slope_0:
+    if norm2(found.by_x) <= limits.tolerance * objective.slope_0:
         raise Ended(f"converged: |dJ/dp| is {limits.tolerance:g} of that at the start")
 
 
