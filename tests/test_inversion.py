@@ -150,7 +150,7 @@ NOISE = np.random.default_rng(0)
         (lambda J, p: J + 1e-3 * NOISE.standard_normal(), "noise of J, about"),
         (lambda J, p: J + 1e10, "J cannot be told apart from its minimum"),
         (lambda J, p: J if p[0] < 0.5 else float("nan"), "is not defined"),
-        (lambda J, p: J + 5.0 * abs(p[0] - 0.3), "J has a kink here"),
+        (lambda J, p: J + 50.0 * max(0.0, p[0] - 0.3), "J has a kink here"),
         (lambda J, p: J + 3.0 * p[0], "the gradient is inconsistent with J"),
     ],
     ids="smooth rounded noisy offset edge kink forgotten".split(),
