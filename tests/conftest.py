@@ -19,6 +19,8 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 # tests compile more than they compute: no optimization, and the emitters that compile in two thirds of the time
 os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false")
 
+gc.set_threshold(50_000)  # what JAX traces lives on: looking through it at every 700 objects finds nothing
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
