@@ -20,7 +20,7 @@ from problems.errors import InputError
 
 FACTOR = 1.6  # of 304 ratios of equal kernels (two cores, load 5) none was beyond x 1.5 of its median, 5 beyond 1.25
 MARK, VERSION = "gradient-routes kernels", 1
-TODO = "write it anew with `make benchmark-baseline`"
+REMEDY = "write it anew with `make benchmark-baseline`"
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ def _ratio(benchmark: Mapping[str, Any]) -> float:
 
 def read(path: Path) -> Kernels:
     """What `write` wrote. Raises InputError."""
-    given = _json(path, "a baseline of kernels", TODO)
+    given = _json(path, "a baseline of kernels", REMEDY)
     if given.get(MARK) != VERSION:
-        raise InputError(f"{path}: is no baseline of kernels of version {VERSION} - {TODO}")
+        raise InputError(f"{path}: is no baseline of kernels of version {VERSION} - {REMEDY}")
     try:
         return {name: Kernel(float(k["ratio"]), k.get("work")) for name, k in given["kernels"].items()}
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"{path}: broken: {type(error).__name__}: {error} - {TODO}") from error
+        raise InputError(f"{path}: broken: {type(error).__name__}: {error} - {REMEDY}") from error
 
 
 def _json(path: Path, what: str, todo: str) -> Mapping[str, Any]:
