@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import case, runner
+from bench import case, runner, timing
 from bench.outcome import Outcome
 from bench.rows import empty_row
 from bench.store import Store
+from bench.studies import race
 from bench.studies.climbing import extrapolated
 from bench.studies.crossing import cheaper, crossing, exact, line
 from bench.studies.power_law import fit
@@ -21,8 +22,11 @@ from bench.studies.scaling import Scaling, abscissas, scaling
 from bench.studies.sizes import Sizes, sizes
 from bench.study_rows import STUDIES
 from bench.workbench import Settings
+from routes.tally import Tally
 
 QUICK = Settings(min_time=0.0)
+QUICK_BUDGET = 0.3
+FORWARD = 7  # counts of a solve of the bar: itself, a step, two residuals, assembly, factorization, substitution
 EIGHTS = 8.0 * 8.0 ** np.arange(6)
 
 
@@ -32,6 +36,30 @@ def sizes_of(selector: str, first: int | None = None, growth: float = 2.0, level
 
 def study(selector: str, *routes: str, settings: Settings = QUICK, **options) -> Scaling:
     return scaling(sizes_of(selector, **options), case.routes(routes), settings)
+
+
+class Clock:
+    """Tells the time of a machine on which a look at it and everything that is counted take TICK: equal work takes
+    equal seconds, whoever else is at work.
+    """
+
+    TICK = 1e-4
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.ticks = 0
+        count = Tally.count
+
+        def counted(tally: Tally, kind: str, times: int = 1) -> None:
+            self.ticks += times
+            count(tally, kind, times)
+
+        patch.setattr(Tally, "count", counted)
+        for module in (timing, race):
+            patch.setattr(module, "time", self)
+
+    def perf_counter(self) -> float:
+        self.ticks += 1
+        return self.ticks * self.TICK
 
 
 # fits
@@ -205,8 +233,10 @@ def test_an_interrupt_keeps_what_is_measured() -> None:
 
 
 @pytest.fixture(scope="module")
-def bars() -> Scaling:
-    return study("bar[n=8|16|32|64]", "adjoint", "tangent", "fd-one-sided", "fd-central")
+def bars() -> Iterator[Scaling]:
+    with pytest.MonkeyPatch.context() as patch:
+        Clock(patch)
+        yield study("bar[n=8|16|32|64]", "adjoint", "tangent", "fd-one-sided", "fd-central")
 
 
 def test_work_on_the_bar_grows_as_the_textbook_says(bars: Scaling) -> None:
@@ -230,7 +260,11 @@ def test_routes_race_on_the_largest_bar(bars: Scaling) -> None:
     assert (found.n_state, found.n_param, found.m_largest, found.points) == (64, 64, 64, 7)
     assert found.predicted == pytest.approx(1.0), "m substitutions against one"
     assert pairs["fd-central", "adjoint"].predicted < 1.0
-    assert pairs["fd-central", "adjoint"].each_s > 0.0
+    differences = pairs["fd-central", "adjoint"]
+    assert differences.each_s == pytest.approx(2 * FORWARD * Clock.TICK)
+    assert differences.other_each_s == pytest.approx(0.0, abs=1e-6 * Clock.TICK)
+    assert pairs["tangent", "adjoint"].each_s == pytest.approx(Clock.TICK), "a substitution each"
+    assert differences.break_even == pytest.approx(differences.other_fixed_s / differences.each_s - 1 / 2 / FORWARD)
 
 
 def test_iterations_are_an_abscissa_too() -> None:
@@ -337,9 +371,13 @@ class Spring(Bar):
 """
 
 
-def test_routes_too_dear_as_a_whole_race_all_the_same() -> None:
-    done = study("bar[n=3000|4000]", "adjoint", "fd-one-sided", settings=replace(QUICK, budget=0.3))
+def test_routes_too_dear_as_a_whole_race_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """3001 forward solves are over the budget, the 285 of a race are not."""
+    Clock(monkeypatch)
+    assert 285 < QUICK_BUDGET / (FORWARD * Clock.TICK) < 3001
+    done = study("bar[n=3000|4000]", "adjoint", "fd-one-sided", settings=replace(QUICK, budget=QUICK_BUDGET))
     assert [row["status"] for row in done.rows if row["route"] == "fd-one-sided"] == ["skipped"]
     (found,) = done.break_evens
     assert (found.route, found.other) == ("fd-one-sided", "adjoint")
-    assert found.each_s > found.other_each_s
+    assert found.each_s == pytest.approx(FORWARD * Clock.TICK)
+    assert found.other_each_s == pytest.approx(0.0, abs=1e-6 * Clock.TICK)
