@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
+from scipy.optimize import minimize_scalar
 
 from bench import case, runner, timing
 from bench.outcome import Outcome
@@ -21,6 +24,7 @@ from bench.studies.race import doublings
 from bench.studies.scaling import Scaling, abscissas, scaling
 from bench.studies.sizes import Sizes, sizes
 from bench.study_rows import STUDIES
+from bench.views import break_even
 from bench.workbench import Settings
 from routes.tally import Tally
 
@@ -133,6 +137,32 @@ def test_known_lines_cross_where_they_do(known: tuple[float, ...]) -> None:
         met = crossing(line(m, (a + b * m) * noise[0]), line(m, (c + d * m) * noise[1]))
         hits += met.low <= truth <= met.high
     assert hits >= 176
+
+
+def test_no_parameter_costs_less_than_nothing() -> None:
+    """Of 200 fits to a cost that has no slope half are clipped to 0, and what is clipped keeps its uncertainty."""
+    m, rng = 2.0 ** np.arange(4), np.random.default_rng(0)
+    fits = [line(m, np.exp(0.1 * rng.standard_normal(4))) for _ in range(200)]
+    clipped = [found for found in fits if found.each == 0.0]
+    assert min(found.each for found in fits) == 0.0
+    assert 60 < len(clipped) < 140
+    assert all(found.covariance[1, 1] > 0.0 for found in clipped)
+    falling = line([1, 2, 4, 8], [20.0, 22.0, 18.0, 14.0])
+    assert falling.each == 0.0
+    best = minimize_scalar(lambda t: sum((t / s - 1) ** 2 for s in (20.0, 22.0, 18.0, 14.0)))
+    assert falling.fixed == pytest.approx(best.x)
+
+
+def test_a_cost_that_noise_makes_negative_is_not_resolved_on_the_screen(bars: Scaling) -> None:
+    found = replace(
+        bars.break_evens[0], other_each_s=0.0, break_even=-0.969, break_even_low=-12.9, break_even_high=1.04
+    )
+    screen = StringIO()
+    console = Console(file=screen, width=120)
+    console.print(break_even.table([found]), break_even.lines([found]))
+    assert "below 0 (up to 1.04)" in screen.getvalue()
+    assert screen.getvalue().splitlines()[-1].endswith("not resolved")
+    assert "-0.969" not in screen.getvalue()
 
 
 def test_lines_that_do_not_cross_are_said_not_to() -> None:
