@@ -67,7 +67,8 @@ def ratios(scale: float = 1.0, n: int = 40, seed: int = 0) -> list[float]:
         ("ok", "timeout", "worse"),
         ("ok", "out-of-memory", "worse"),
         ("skipped", "crashed", "worse"),
-        ("ok", "pruned", "shown"),
+        ("ok", "pruned", "worse"),
+        ("ok", "skipped", "worse"),
         ("failed", "failed", "same"),
         ("failed", "crashed", "shown"),
         ("timeout", "skipped", "shown"),
@@ -90,9 +91,34 @@ def test_every_status_has_a_judgement() -> None:
     }
 
 
-def test_a_bill_may_skip_a_case_a_route_that_no_longer_runs_may_not() -> None:
-    assert rules.status(case(), case(status="skipped", predicted_s=100.0)).judgement == "shown"
-    assert rules.status(case(), case(status="skipped")).judgement == "worse"
+@pytest.mark.parametrize(
+    ("before", "now", "in_a_subset"),
+    [
+        (60.0, 60.0, "worse"),  # a route 1000 x dearer
+        (None, 60.0, "worse"),  # of a baseline that does not tell its budget
+        (60.0, 1.0, "shown"),
+    ],
+)
+def test_what_was_ok_may_be_skipped_for_another_budget_in_a_subset_only(before, now, in_a_subset: str) -> None:
+    base = case(budget_s=before)
+    for status in ("skipped", "pruned"):
+        new = case(status=status, predicted_s=100.0, budget_s=now)
+        assert rules.status(base, new).judgement == "worse"
+        assert rules.status(base, new, subset=True).judgement == in_a_subset
+        assert {
+            f.judgement for f in compare(side(base, case(at="x")), side(new, case(at="x")), subset=True).findings
+        } > {in_a_subset}
+
+
+def test_a_route_that_no_longer_runs_on_a_problem_is_worse_in_a_subset_too() -> None:
+    new = case(status="skipped", budget_s=1.0)
+    assert rules.status(case(budget_s=60.0), new, subset=True).judgement == "worse"
+
+
+def test_a_baseline_keeps_the_budget(tmp_path: Path) -> None:
+    path = stored(tmp_path / "s.sqlite", row(budget_s=60.0))
+    write(tmp_path / "b.json", of_store(Store(path)))
+    assert [c.row["budget_s"] for c in measured(tmp_path / "b.json").cases] == [60.0]
 
 
 @pytest.mark.parametrize(
@@ -147,7 +173,24 @@ def test_memory_is_worse_by_percent_and_by_a_floor(before: float, now: float, ju
     assert found.judgement == judgement
 
 
-@pytest.mark.parametrize("values", [{"memory_method": "ru_maxrss"}, {"isolated": 1}, {"peak_bytes": None}])
+@pytest.mark.parametrize("values", [{"memory_method": None}, {}])
+@pytest.mark.parametrize("metric", ["peak_bytes", "tape_bytes"])
+def test_bytes_that_are_no_longer_known_are_worse_and_found_ones_are_shown(metric: str, values: dict) -> None:
+    known, unknown = case(), case(**values, **{metric: None})
+    lost = of(compare(side(known), side(unknown)), metric)
+    assert (lost.judgement, lost.says) == ("worse", f"{metric} is no longer known")
+    assert of(compare(side(case(**{metric: None})), side(known)), metric).judgement == "shown"
+
+
+def test_bytes_that_other_options_do_not_hold_are_not_compared() -> None:
+    """A route resolves its options by what is at hand: fresh factors are none to hold."""
+    known, other = case(case_key="a"), case(case_key="a", route_options={"factors": "fresh"}, tape_bytes=None)
+    assert of(compare(side(known), side(other)), "tape_bytes").judgement == "not-compared"
+
+
+@pytest.mark.parametrize(
+    "values", [{"memory_method": "ru_maxrss"}, {"isolated": 1}, {"isolated": 1, "peak_bytes": None}]
+)
 def test_memory_measured_otherwise_is_not_compared_and_that_is_said(values: dict) -> None:
     found = rules.peak_bytes(case(), case(**({"peak_bytes": 100 * MIB} | values)))
     assert found.judgement == "not-compared"
@@ -237,10 +280,11 @@ def test_seconds_are_shown_and_never_judged() -> None:
 
 
 def test_an_expected_failure_is_no_regression_and_says_why() -> None:
-    expected = Expectation("bar[n=8]", "adjoint", "timeout", "it is slow")
-    found = compare(side(case()), side(case(status="timeout")), [expected])
+    expected, other = Expectation("bar[n=8]", "adjoint", "timeout", "it is slow"), case(route="tangent")
+    found = compare(side(case(), other), side(case(status="timeout"), other), [expected])
     assert not found.worse
-    assert of(found, "status").says == "timeout, expected: it is slow"
+    assert [f.says for f in found.findings if f.metric == "status"] == ["timeout, expected: it is slow", ""]
+    assert conclusion(found) == ("no regression: 1 case compared by numbers, 1 by status only, nothing better or worse")
     assert compare(side(case()), side(case(status="failed")), [expected]).worse
 
 
@@ -265,8 +309,34 @@ def test_what_is_no_longer_measured_is_worse_but_for_a_subset() -> None:
 def test_a_gate_does_not_pass_by_measuring_nothing() -> None:
     with pytest.raises(InputError, match=r"of 1 cases in side and 1 in side none is in both - "):
         compare(side(case()), side(case(route="tangent")), subset=True)
-    with pytest.raises(InputError, match="measured none of the 1 cases"):
-        compare(side(case()), side(case(status="skipped", predicted_s=1e9)))
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "said"),
+    [
+        ("ok", "skipped", "2 ok in side, 2 skipped in side"),
+        ("ok", "pruned", "2 ok in side, 2 pruned in side"),
+        ("failed", "failed", "2 failed in side, 2 failed in side"),
+        ("failed", "ok", "2 failed in side, 2 ok in side"),
+    ],
+)
+@pytest.mark.parametrize("verdicts", [(), (Verdict("bar", "adjoint", "start", "agrees"),)])
+def test_cases_without_a_number_to_compare_are_an_error_whatever_verdicts_agree(
+    before: str, now: str, said: str, verdicts: tuple[Verdict, ...]
+) -> None:
+    base, new = (
+        side(
+            *(case(status=status, route=route, predicted_s=1e9) for route in ("adjoint", "tangent")), verdicts=verdicts
+        )
+        for status in (before, now)
+    )
+    with pytest.raises(InputError, match=rf"^compare: no numbers to compare in 2 cases in both, {said} - [^\n]+$"):
+        compare(base, new)
+    assert compare(side(*base.cases, case(at="x")), side(*new.cases, case(at="x"))).by_numbers == 1
+
+
+def test_cases_that_all_fail_are_a_regression_and_no_error() -> None:
+    assert compare(side(case()), side(case(status="crashed"))).worse
 
 
 def test_cases_are_paired_by_key_and_where_a_version_had_none_by_name() -> None:
@@ -329,7 +399,9 @@ def test_exit_code_0_where_nothing_is_worse(cli, base: Path) -> None:
     for before in ("base.sqlite", "base.json"):
         ran = cli("compare", before, "base.sqlite")
         assert (ran.code, ran.err) == (0, "")
-        assert ran.out.splitlines()[-1] == "no regression: 1 case and 1 verdict compared, nothing better or worse"
+        assert ran.out.splitlines()[-1] == (
+            "no regression: 1 case compared by numbers, 0 by status only and 1 verdict, nothing better or worse"
+        )
 
 
 def test_exit_code_1_on_a_regression_that_all_formats_name(cli, tmp_path: Path, base: Path) -> None:
@@ -342,7 +414,7 @@ def test_exit_code_1_on_a_regression_that_all_formats_name(cli, tmp_path: Path, 
         "worse: adjoint on bar: agrees -> wrong-gradient",
         "forward solves: x 2, limit x 1.25",
         "1 fwd + 1 adj -> 1 fwd + 2 adj",
-        "a regression: 1 case and 1 verdict compared, 3 worse",
+        "a regression: 1 case compared by numbers, 0 by status only and 1 verdict, 3 worse",
     ):
         assert words in table.out
     found = json.loads(cli("compare", "base.json", "new.sqlite", "--format", "json").out)
@@ -358,6 +430,9 @@ def test_exit_code_1_on_a_regression_that_all_formats_name(cli, tmp_path: Path, 
 
 def test_expected_failures_are_read_beside_new_or_where_it_is_said(cli, tmp_path: Path, base: Path) -> None:
     (tmp_path / "new").mkdir()
+    for path in (tmp_path / "base.sqlite", tmp_path / "new" / "s.sqlite"):
+        stored(path, row(route="tangent"))
+    write(tmp_path / "base.json", of_store(Store(tmp_path / "base.sqlite")))
     stored(tmp_path / "new" / "s.sqlite", row(status="timeout"))
     assert cli("compare", "base.json", "new/s.sqlite").code == 1
     entry = 'problem = "bar"\nroute = "adjoint"\nstatus = "timeout"\nreason = "it is slow"\n'
@@ -381,7 +456,7 @@ def test_names_of_others_break_no_markdown() -> None:
     assert "m.py:A\\|&lt;b>\\[x=\\`\\]" in text
     assert max(line.count("|") - line.count("\\|") for line in text.splitlines()) == 10
     assert json.loads(as_json(found))["worse"]
-    assert conclusion(found) == "a regression: 1 case compared, 1 worse"
+    assert conclusion(found) == "a regression: 0 cases compared by numbers, 1 by status only, 1 worse"
 
 
 BROKEN = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 
@@ -97,6 +98,8 @@ def test_a_baseline_is_the_median_of_its_sessions() -> None:
         ("{}", "is no baseline of kernels of version 1"),
         ('{"gradient-routes kernels": 2}', "is no baseline of kernels of version 1"),
         ('{"gradient-routes kernels": 1, "kernels": {"a": 3}}', "broken: TypeError"),
+        ('{"gradient-routes kernels": 1, "kernels": {"a": {"ratio": 0}}}', "broken: ValueError: a ratio of 0"),
+        ('{"gradient-routes kernels": 1, "kernels": {}}', "no kernel in it"),
     ],
 )
 def test_a_wrong_baseline_is_refused_in_one_line(tmp_path: Path, text: str | None, said: str) -> None:
@@ -112,6 +115,30 @@ def test_a_session_that_measured_nothing_is_refused(tmp_path: Path) -> None:
     (tmp_path / "s.json").write_text('{"benchmarks": []}')
     with pytest.raises(InputError, match="no benchmark in it"):
         of_session(tmp_path / "s.json")
+
+
+@pytest.mark.parametrize("name", ["stats", "extra_info"])
+def test_a_benchmark_without_its_time_or_calibration_is_refused(tmp_path: Path, name: str) -> None:
+    content = json.loads(session(tmp_path / "s.json").read_text())
+    content["benchmarks"][1][name] = {}
+    (tmp_path / "s.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"^\S+: a benchmark without its time or calibration: KeyError: .* - measure"):
+        of_session(tmp_path / "s.json")
+
+
+@pytest.fixture
+def gate(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(ROOT / "tests" / "benchmarks")
+    return importlib.import_module("gate")
+
+
+def test_a_report_of_benchmarks_that_are_all_gone_is_refused(gate, base, capsys) -> None:
+    for known in (base, {}):
+        with pytest.raises(InputError, match=rf"^of {len(known)} benchmarks in baseline.json none was measured - "):
+            gate.report(judge(known, {"another": Kernel(1.0)}))
+    assert capsys.readouterr().out == ""
+    assert gate.report(judge(base, {"tangent": base["tangent"]})) == 1
+    assert "a regression: 1 benchmarks" in capsys.readouterr().out
 
 
 def test_the_committed_baseline_holds_every_route_with_its_work() -> None:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
+from scipy.optimize import minimize_scalar
 
-from bench import case, runner
+from bench import case, runner, timing
 from bench.outcome import Outcome
 from bench.rows import empty_row
 from bench.store import Store
+from bench.studies import race
 from bench.studies.climbing import extrapolated
 from bench.studies.crossing import cheaper, crossing, exact, line
 from bench.studies.power_law import fit
@@ -20,9 +24,13 @@ from bench.studies.race import doublings
 from bench.studies.scaling import Scaling, abscissas, scaling
 from bench.studies.sizes import Sizes, sizes
 from bench.study_rows import STUDIES
+from bench.views import break_even
 from bench.workbench import Settings
+from routes.tally import Tally
 
 QUICK = Settings(min_time=0.0)
+QUICK_BUDGET = 0.3
+FORWARD = 7  # counts of a solve of the bar: itself, a step, two residuals, assembly, factorization, substitution
 EIGHTS = 8.0 * 8.0 ** np.arange(6)
 
 
@@ -32,6 +40,30 @@ def sizes_of(selector: str, first: int | None = None, growth: float = 2.0, level
 
 def study(selector: str, *routes: str, settings: Settings = QUICK, **options) -> Scaling:
     return scaling(sizes_of(selector, **options), case.routes(routes), settings)
+
+
+class Clock:
+    """Tells the time of a machine on which a look at it and everything that is counted take TICK: equal work takes
+    equal seconds, whoever else is at work.
+    """
+
+    TICK = 1e-4
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.ticks = 0
+        count = Tally.count
+
+        def counted(tally: Tally, kind: str, times: int = 1) -> None:
+            self.ticks += times
+            count(tally, kind, times)
+
+        patch.setattr(Tally, "count", counted)
+        for module in (timing, race):
+            patch.setattr(module, "time", self)
+
+    def perf_counter(self) -> float:
+        self.ticks += 1
+        return self.ticks * self.TICK
 
 
 # fits
@@ -105,6 +137,32 @@ def test_known_lines_cross_where_they_do(known: tuple[float, ...]) -> None:
         met = crossing(line(m, (a + b * m) * noise[0]), line(m, (c + d * m) * noise[1]))
         hits += met.low <= truth <= met.high
     assert hits >= 176
+
+
+def test_no_parameter_costs_less_than_nothing() -> None:
+    """Of 200 fits to a cost that has no slope half are clipped to 0, and what is clipped keeps its uncertainty."""
+    m, rng = 2.0 ** np.arange(4), np.random.default_rng(0)
+    fits = [line(m, np.exp(0.1 * rng.standard_normal(4))) for _ in range(200)]
+    clipped = [found for found in fits if found.each == 0.0]
+    assert min(found.each for found in fits) == 0.0
+    assert 60 < len(clipped) < 140
+    assert all(found.covariance[1, 1] > 0.0 for found in clipped)
+    falling = line([1, 2, 4, 8], [20.0, 22.0, 18.0, 14.0])
+    assert falling.each == 0.0
+    best = minimize_scalar(lambda t: sum((t / s - 1) ** 2 for s in (20.0, 22.0, 18.0, 14.0)))
+    assert falling.fixed == pytest.approx(best.x)
+
+
+def test_a_cost_that_noise_makes_negative_is_not_resolved_on_the_screen(bars: Scaling) -> None:
+    found = replace(
+        bars.break_evens[0], other_each_s=0.0, break_even=-0.969, break_even_low=-12.9, break_even_high=1.04
+    )
+    screen = StringIO()
+    console = Console(file=screen, width=120)
+    console.print(break_even.table([found]), break_even.lines([found]))
+    assert "below 0 (up to 1.04)" in screen.getvalue()
+    assert screen.getvalue().splitlines()[-1].endswith("not resolved")
+    assert "-0.969" not in screen.getvalue()
 
 
 def test_lines_that_do_not_cross_are_said_not_to() -> None:
@@ -205,8 +263,10 @@ def test_an_interrupt_keeps_what_is_measured() -> None:
 
 
 @pytest.fixture(scope="module")
-def bars() -> Scaling:
-    return study("bar[n=8|16|32|64]", "adjoint", "tangent", "fd-one-sided", "fd-central")
+def bars() -> Iterator[Scaling]:
+    with pytest.MonkeyPatch.context() as patch:
+        Clock(patch)
+        yield study("bar[n=8|16|32|64]", "adjoint", "tangent", "fd-one-sided", "fd-central")
 
 
 def test_work_on_the_bar_grows_as_the_textbook_says(bars: Scaling) -> None:
@@ -230,7 +290,11 @@ def test_routes_race_on_the_largest_bar(bars: Scaling) -> None:
     assert (found.n_state, found.n_param, found.m_largest, found.points) == (64, 64, 64, 7)
     assert found.predicted == pytest.approx(1.0), "m substitutions against one"
     assert pairs["fd-central", "adjoint"].predicted < 1.0
-    assert pairs["fd-central", "adjoint"].each_s > 0.0
+    differences = pairs["fd-central", "adjoint"]
+    assert differences.each_s == pytest.approx(2 * FORWARD * Clock.TICK)
+    assert differences.other_each_s == pytest.approx(0.0, abs=1e-6 * Clock.TICK)
+    assert pairs["tangent", "adjoint"].each_s == pytest.approx(Clock.TICK), "a substitution each"
+    assert differences.break_even == pytest.approx(differences.other_fixed_s / differences.each_s - 1 / 2 / FORWARD)
 
 
 def test_iterations_are_an_abscissa_too() -> None:
@@ -337,9 +401,13 @@ class Spring(Bar):
 """
 
 
-def test_routes_too_dear_as_a_whole_race_all_the_same() -> None:
-    done = study("bar[n=3000|4000]", "adjoint", "fd-one-sided", settings=replace(QUICK, budget=0.3))
+def test_routes_too_dear_as_a_whole_race_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """3001 forward solves are over the budget, the 285 of a race are not."""
+    Clock(monkeypatch)
+    assert 285 < QUICK_BUDGET / (FORWARD * Clock.TICK) < 3001
+    done = study("bar[n=3000|4000]", "adjoint", "fd-one-sided", settings=replace(QUICK, budget=QUICK_BUDGET))
     assert [row["status"] for row in done.rows if row["route"] == "fd-one-sided"] == ["skipped"]
     (found,) = done.break_evens
     assert (found.route, found.other) == ("fd-one-sided", "adjoint")
-    assert found.each_s > found.other_each_s
+    assert found.each_s == pytest.approx(FORWARD * Clock.TICK)
+    assert found.other_each_s == pytest.approx(0.0, abs=1e-6 * Clock.TICK)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 BASELINE = Path("results") / "baseline.json"
 PATH = click.Path(path_type=Path)
 FACTOR = "By which the median ratio of times must grow, beside a test by ranks, to be worse."
-SUBSET = "NEW need not hold all that BASE holds."
+SUBSET = "NEW need not hold all that BASE holds, nor run what another --budget skips."
 EXPECTED = "File of expected failures. [expected.toml beside NEW, if there is one]"
 
 
@@ -43,15 +43,17 @@ def compare(
     """Is NEW worse than BASE? Stores, or baselines that `routes baseline` wrote; the latest row of every case counts.
 
     \b
-    status   worse where a case fails that did not, but for those that expected.toml names
+    status   worse where a case fails or is no longer run that did not, but for those that expected.toml names
     work     exact: more of any count is worse
     error    worse by an order of magnitude, from 1e-13 on
     verdict  exact
-    memory   worse by 25 % and 5 MiB; bytes of tapes and factors by 10 %
+    memory   worse by 25 % and 5 MiB; bytes of tapes and factors by 10 %; no longer measured
     time     in forward solves of the same run: worse by ranks of all rounds and by --factor;
              not compared between different machines. Seconds are shown, never judged.
 
-    A case of BASE that NEW lacks is worse, too. Exit code: 0 nothing is worse, 1 a regression, 2 wrong usage.
+    A case of BASE that NEW lacks is worse, too, and no case that is ok in both is an error.
+
+    Exit code: 0 nothing is worse, 1 a regression, 2 wrong usage.
     """
     from bench import expected as expectations
     from bench.files import check_writable

@@ -23,7 +23,7 @@ ROUNDS = 50  # ratios kept of a case: more tell ranks little and fill pages
 MAGIC = b"SQLite format 3\0"
 COLUMN = {column.name: column for column in COLUMNS}
 REQUIRED = ("problem", "route", "at", "status")
-TODO = "write it anew with `routes baseline`"
+REMEDY = "write it anew with `routes baseline`"
 
 
 def measured(path: Path) -> Measured:
@@ -100,15 +100,17 @@ def read(path: Path, content: bytes) -> Measured:
     except json.JSONDecodeError as error:
         if MARK.encode() not in content[:100]:
             raise InputError(f"{path}: is neither a store nor a baseline - name one") from error
-        raise InputError(f"{path}: broken in line {error.lineno}: {error.msg} - {TODO}") from error
+        raise InputError(f"{path}: broken in line {error.lineno}: {error.msg} - {REMEDY}") from error
     if not isinstance(given, dict) or MARK not in given:
         raise InputError(f"{path}: is neither a store nor a baseline - name one")
     if given[MARK] != VERSION:
-        raise InputError(f"{path}: is a baseline of version {given[MARK]!r}, this one knows {VERSION} - {TODO}")
+        raise InputError(f"{path}: is a baseline of version {given[MARK]!r}, this one knows {VERSION} - {REMEDY}")
     try:
         return _measured(path, given)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise InputError(f"{path}: broken: {type(error).__name__}: {' '.join(str(error).split())} - {TODO}") from error
+        raise InputError(
+            f"{path}: broken: {type(error).__name__}: {' '.join(str(error).split())} - {REMEDY}"
+        ) from error
 
 
 def _measured(path: Path, given: Mapping[str, Any]) -> Measured:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -38,6 +39,16 @@ class Comparison:
         return {judgement: self.count(judgement) for judgement in JUDGEMENTS}
 
     @property
+    def by_numbers(self) -> int:
+        """Cases whose numbers are compared: they are ok on both sides."""
+        return sum(f.metric == "status" and f.base == f.new == "ok" for f in self.findings)
+
+    @property
+    def by_status(self) -> int:
+        """Cases of both of which no more than how they ended is compared."""
+        return sum(f.metric == "status" for f in self.findings) - self.by_numbers
+
+    @property
     def worse(self) -> bool:
         return _any_worse(self.findings)
 
@@ -62,13 +73,28 @@ def compare(
             " - run the same problems and routes"
         )
     time = TimeRule(factor, sum(bool(b.ratios and n.ratios) for b, n in pairs))
-    findings = [finding for b, n in pairs for finding in of_case(b, n, expectations, time)]
-    if not common and all(n.row["status"] in UNMEASURED for _, n in pairs) and not _any_worse(findings):
-        raise InputError(f"compare: {new.source} measured none of the {len(pairs)} cases in both - raise its budget")
+    findings = [finding for b, n in pairs for finding in of_case(b, n, expectations, time, subset)]
+    _check_measured(base, new, pairs, findings)
     findings += [rules.gone(case.row, case.row["status"], subset or not case.ok) for case in gone]
     findings += [rules.added(case.row, case.row["status"]) for case in added]
     findings += verdicts
     return Comparison(base.source, new.source, tuple(findings), (*_libraries(pairs), *_idle(new, expectations)))
+
+
+def _check_measured(base: Measured, new: Measured, pairs: Sequence[Pair], findings: Sequence[Finding]) -> None:
+    """Raises InputError where pairs tell nothing in numbers, unless a case that was run and fails is a regression."""
+    ran = any(n.row["status"] not in UNMEASURED for _, n in pairs)
+    if not pairs or any(b.ok and n.ok for b, n in pairs) or (ran and _any_worse(findings)):
+        return
+    before, now = (Counter(pair[side].row["status"] for pair in pairs) for side in (0, 1))
+    raise InputError(
+        f"compare: no numbers to compare in {len(pairs)} cases in both, {_counted(before)} in {base.source},"
+        f" {_counted(now)} in {new.source} - measure at least one that is ok in both, or raise --budget"
+    )
+
+
+def _counted(statuses: Counter[str]) -> str:
+    return " and ".join(f"{count} {status}" for status, count in statuses.items())
 
 
 def paired(base: Sequence[Case], new: Sequence[Case]) -> tuple[list[Pair], list[Case], list[Case]]:
@@ -92,9 +118,11 @@ def _paired(
     return pairs, [case for case in base if id(case) not in there], [case for case in new if id(case) not in here]
 
 
-def of_case(base: Case, new: Case, expectations: Sequence[Expectation], time: TimeRule) -> Iterator[Finding]:
+def of_case(
+    base: Case, new: Case, expectations: Sequence[Expectation], time: TimeRule, subset: bool = False
+) -> Iterator[Finding]:
     """What there is to say of one case: how it ended, and where it was measured in both the numbers."""
-    ended, expected = rules.status(base, new), judged(new.row, expectations)
+    ended, expected = rules.status(base, new, subset), judged(new.row, expectations)
     if expected is not None:
         ended = Finding(ended.case, ended.metric, ended.base, ended.new, "shown", f"{ended.new}, {expected.says}")
     yield ended

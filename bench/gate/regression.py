@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -20,7 +21,8 @@ from problems.errors import InputError
 
 FACTOR = 1.6  # of 304 ratios of equal kernels (two cores, load 5) none was beyond x 1.5 of its median, 5 beyond 1.25
 MARK, VERSION = "gradient-routes kernels", 1
-TODO = "write it anew with `make benchmark-baseline`"
+REMEDY = "write it anew with `make benchmark-baseline`"
+MALFORMED = (KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError)  # what a foreign JSON may lead to
 
 
 @dataclass(frozen=True)
@@ -39,22 +41,35 @@ def of_session(path: Path) -> Kernels:
     benchmarks = _json(path, "a session of pytest-benchmark", "measure again").get("benchmarks")
     if not benchmarks:
         raise InputError(f"{path}: no benchmark in it - measure again")
-    return {b["fullname"]: Kernel(_ratio(b), b["extra_info"].get("work")) for b in benchmarks}
+    try:
+        return {b["fullname"]: Kernel(_ratio(b), b["extra_info"].get("work")) for b in benchmarks}
+    except MALFORMED as error:
+        says = f"{type(error).__name__}: {error}"
+        raise InputError(f"{path}: a benchmark without its time or calibration: {says} - measure again") from error
 
 
 def _ratio(benchmark: Mapping[str, Any]) -> float:
-    return float(benchmark["stats"]["min"] / min(benchmark["extra_info"]["calibration_s"]))
+    return _positive(benchmark["stats"]["min"] / min(benchmark["extra_info"]["calibration_s"]))
+
+
+def _positive(ratio: Any) -> float:
+    if not 0.0 < float(ratio) < inf:
+        raise ValueError(f"a ratio of {ratio}")
+    return float(ratio)
 
 
 def read(path: Path) -> Kernels:
     """What `write` wrote. Raises InputError."""
-    given = _json(path, "a baseline of kernels", TODO)
+    given = _json(path, "a baseline of kernels", REMEDY)
     if given.get(MARK) != VERSION:
-        raise InputError(f"{path}: is no baseline of kernels of version {VERSION} - {TODO}")
+        raise InputError(f"{path}: is no baseline of kernels of version {VERSION} - {REMEDY}")
     try:
-        return {name: Kernel(float(k["ratio"]), k.get("work")) for name, k in given["kernels"].items()}
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"{path}: broken: {type(error).__name__}: {error} - {TODO}") from error
+        kernels = {name: Kernel(_positive(k["ratio"]), k.get("work")) for name, k in given["kernels"].items()}
+    except MALFORMED as error:
+        raise InputError(f"{path}: broken: {type(error).__name__}: {error} - {REMEDY}") from error
+    if not kernels:
+        raise InputError(f"{path}: no kernel in it - {REMEDY}")
+    return kernels
 
 
 def _json(path: Path, what: str, todo: str) -> Mapping[str, Any]:

@@ -18,15 +18,18 @@ MEMORY, FLOOR = 1.25, 5 * 2**20  # pages of allocators and interpreters come and
 HELD = 1.1  # arrays are counted, but padded and ordered as the library likes
 
 
-def status(base: Case, new: Case) -> Finding:
-    """A case that was answered and fails is worse, and so is one that nothing but its bill could keep from running."""
+def status(base: Case, new: Case, subset: bool = False) -> Finding:
+    """A case that was answered and fails is worse, and so is one that was ok and is not run any more.
+
+    Under another budget `subset` allows the latter: it is then the budget that may have changed, and not the bill.
+    """
     before, now = base.row["status"], new.row["status"]
     reason = f": {new.row['reason']}" if new.row["reason"] else ""
     says = f"{before} -> {now}{reason}" if before != now else ""
-    return Finding(new.row, "status", before, now, _ended(base, new), says)
+    return Finding(new.row, "status", before, now, _ended(base, new, subset), says)
 
 
-def _ended(base: Case, new: Case) -> Judgement:
+def _ended(base: Case, new: Case, subset: bool) -> Judgement:
     before, now = base.row["status"], new.row["status"]
     if before == now:
         return "same"
@@ -34,8 +37,14 @@ def _ended(base: Case, new: Case) -> Judgement:
         return "shown" if before in ANSWERED else "better"
     if now not in ANSWERED:
         return "worse" if before in ANSWERED else "shown"
-    lost = base.ok and now == "skipped" and new.row["predicted_s"] is None  # the route no longer runs on the problem
-    return "worse" if lost else "shown"
+    return "worse" if base.ok and not (subset and _may_be_the_budget(base, new)) else "shown"
+
+
+def _may_be_the_budget(base: Case, new: Case) -> bool:
+    """Not where a route no longer runs on the problem, which has no bill; a baseline may not tell its budget."""
+    before, now = base.row["budget_s"], new.row["budget_s"]
+    lost = new.row["status"] == "skipped" and new.row["predicted_s"] is None
+    return before is not None and before != now and not lost
 
 
 def work(base: Case, new: Case) -> Finding:
@@ -80,12 +89,12 @@ def _finite(value: float | None) -> float | None:
 def peak_bytes(base: Case, new: Case) -> Finding:
     """Measured: worse by percent and by an absolute floor; only what was measured in the same way compares."""
     before, now = base.row["peak_bytes"], new.row["peak_bytes"]
-    if before is None or now is None:
-        return _uncompared("peak_bytes", new, before, now, "memory, not measured in both")
     for name, how in (("memory_method", "measured by"), ("isolated", "with isolated =")):
         a, b = base.row[name], new.row[name]
-        if a != b:
+        if a != b and (now is not None or name == "isolated"):  # what is not measured has no method
             return _uncompared("peak_bytes", new, before, now, f"memory, {how} {a} there, {b} here")
+    if before is None or now is None:
+        return _absent("peak_bytes", base, new, before, now)
     judgement: Judgement = "same"
     if now > MEMORY * before and now - before > FLOOR:
         judgement = "worse"
@@ -95,10 +104,12 @@ def peak_bytes(base: Case, new: Case) -> Finding:
 
 
 def held(metric: str, base: Case, new: Case) -> Finding:
-    """Counted bytes of arrays, a tape's or factors': worse beyond HELD."""
+    """Counted bytes of arrays, a tape's or factors': worse beyond HELD, and where they are no longer counted."""
     before, now = base.row[metric], new.row[metric]
+    if now is None and before is not None and base.row["route_options"] != new.row["route_options"]:
+        return _uncompared(metric, new, before, now, f"{metric}, the route has other options")
     if before is None or now is None:
-        return Finding(new.row, metric, before, now, "same" if before == now else "shown")
+        return _absent(metric, base, new, before, now)
     judgement: Judgement = "worse" if now > HELD * before else "better" if before > HELD * now else "same"
     return Finding(new.row, metric, before, now, judgement, _grown(metric.partition("_")[0], before, now, judgement))
 

@@ -36,13 +36,19 @@ class Crossing:
 
 
 def line(m: Sequence[float], t: Sequence[float]) -> Line:
-    """Least squares of relative errors through at least FEWEST points."""
+    """Least squares of relative errors through at least FEWEST points, with a slope >= 0.
+
+    No parameter costs less than nothing: a slope that noise makes negative is 0, which errs by less, and the covariance
+    remains that of the fit without this knowledge.
+    """
     times = np.asarray(t, dtype=np.float64)
     A = np.column_stack([np.ones_like(times), m]) / times[:, None]
     (fixed, each), *_ = np.linalg.lstsq(A, np.ones_like(times), rcond=None)
     freedom = len(times) - 2
     left = A @ (fixed, each) - 1.0
     covariance = np.linalg.inv(A.T @ A) * (left @ left) / freedom
+    if each < 0.0:
+        fixed, each = A[:, 0].sum() / (A[:, 0] @ A[:, 0]), 0.0
     return Line(float(fixed), float(each), covariance, freedom)
 
 

@@ -14,8 +14,8 @@ from bench.views.format import number, seconds
 from bench.views.palette import route_style
 
 LEGEND = (
-    "break-even: n_p at which fixed + each n_p is the same of both (95 % confidence, Fieller's); predicted: by declared"
-    " work at measured prices"
+    "break-even: n_p at which fixed + each n_p is the same of both (95 % confidence, Fieller's), below 0 where neither"
+    " ever catches up; predicted: by declared work at measured prices; not resolved: 0 within the noise"
 )
 
 
@@ -46,6 +46,8 @@ def _pair(one: BreakEven) -> Text:
 def _fitted(one: BreakEven) -> str:
     if one.break_even is None:
         return "none"
+    if one.break_even < 0.0:
+        return f"below 0 (up to {number(one.break_even_high)})"
     return f"{one.break_even:.3g} ({number(one.break_even_low)} to {number(one.break_even_high)})"
 
 
@@ -58,7 +60,8 @@ def lines(found: Sequence[BreakEven]) -> Table:
     both = [(one.route, one.fixed_s, one.each_s) for one in found]
     both += [(one.other, one.other_fixed_s, one.other_each_s) for one in found]
     for route, fixed, each in dict.fromkeys(both):
-        out.add_row(Text(route, style=route_style(route)), signed(fixed), signed(each))
+        slope = "not resolved" if each <= 0.0 else seconds(each)
+        out.add_row(Text(route, style=route_style(route)), signed(fixed), slope)
     return out
 
 

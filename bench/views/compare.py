@@ -118,11 +118,16 @@ def _whose(findings: Sequence[Finding]) -> str:
 
 
 def conclusion(comparison: Comparison) -> str:
-    """How many findings of each kind, and whether they make a regression."""
-    cases = sum(finding.metric == "status" for finding in comparison.findings)
+    """How many cases are compared and by what, findings of each kind, and whether they make a regression."""
     verdicts = sum(finding.metric == "verdict" for finding in comparison.findings)
-    compared = [f"{n} {what}{'s' if n > 1 else ''}" for n, what in ((cases, "case"), (verdicts, "verdict")) if n]
+    compared = [_cases(comparison)] if comparison.by_numbers or comparison.by_status else []
+    compared += [f"{verdicts} verdict{'s' if verdicts > 1 else ''}"] if verdicts else []
     counts = {j: comparison.count(j) for j in ("worse", "better")}
     said = ", ".join(f"{n} {judgement}" for judgement, n in counts.items() if n)
     word = "a regression" if comparison.worse else "no regression"
-    return f"{word}: {' and '.join(compared)} compared, {said or 'nothing better or worse'}"
+    return f"{word}: {' and '.join(compared)}, {said or 'nothing better or worse'}"
+
+
+def _cases(comparison: Comparison) -> str:
+    numbers, status = comparison.by_numbers, comparison.by_status
+    return f"{numbers} case{'' if numbers == 1 else 's'} compared by numbers, {status} by status only"

@@ -49,6 +49,8 @@ def as_json(comparison: Comparison) -> str:
         "base": comparison.base,
         "new": comparison.new,
         "worse": comparison.worse,
+        "by_numbers": comparison.by_numbers,
+        "by_status": comparison.by_status,
         "counts": comparison.counts,
         "notes": list(comparison.notes),
         "findings": [_finding(finding) for finding in comparison.findings],

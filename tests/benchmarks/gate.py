@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.gate.finding import JUDGEMENTS, Finding
-from bench.gate.regression import Kernels, again, judge, of_session, read, typical, write
+from bench.gate.regression import REMEDY, Kernels, again, judge, of_session, read, typical, write
 from problems.errors import InputError
 
 HERE = Path(__file__).parent
@@ -75,11 +75,14 @@ def short(name: str) -> str:
 
 
 def report(findings: Sequence[Finding]) -> int:
-    """What changed, the slowest and fastest of what did not; the exit code."""
+    """What changed, the slowest and fastest of what did not; the exit code. Raises InputError where none was timed."""
+    growths = sorted((f.new / f.base, short(f.case["name"])) for f in findings if f.metric == "time")
+    if not growths:
+        gone = len(worse(findings))
+        raise InputError(f"of {gone} benchmarks in {BASELINE.name} none was measured - {REMEDY}, or mend their names")
     for finding in sorted(findings, key=lambda f: JUDGEMENTS.index(f.judgement)):
         if finding.judgement != "same":
             print(f"{finding.judgement}: {short(finding.case['name'])}: {finding.metric}: {finding.says}")
-    growths = sorted((f.new / f.base, short(f.case["name"])) for f in findings if f.metric == "time")
     extremes = f"from x {growths[0][0]:.2f} ({growths[0][1]}) to x {growths[-1][0]:.2f} ({growths[-1][1]})"
     failed = worse(findings)
     print(f"{'a regression' if failed else 'no regression'}: {len(growths)} benchmarks, {extremes}")
