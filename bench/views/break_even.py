@@ -14,8 +14,8 @@ from bench.views.format import number, seconds
 from bench.views.palette import route_style
 
 LEGEND = (
-    "break-even: n_p at which fixed + each n_p is the same of both (95 % confidence, Fieller's), below 0 where neither"
-    " ever catches up; predicted: by declared work at measured prices; not resolved: 0 within the noise"
+    "break-even: n_p at which fixed + each n_p is the same of both (95 % confidence, Fieller's), below 0: they meet at"
+    " no number of parameters; predicted: by declared work at measured prices; not resolved: 0 within the noise"
 )
 
 
