@@ -16,11 +16,16 @@ import psutil
 import pytest
 from conftest import ROOT, Ran, with_routes
 
+from bench import case
 from bench.case import ProblemSpec, RouteSpec
+from bench.executors import isolated
+from bench.isolation import process as watching
 from bench.isolation.limits import Limits, affinity_of, memory_of
 from bench.pruning import Pruning
 from bench.rows import empty_row
+from bench.runner import How, run
 from bench.store import Store
+from bench.workbench import Settings
 from problems.errors import InputError
 from routes.adjoint import adjoint
 
@@ -96,6 +101,39 @@ def started(tmp_path: Path) -> Iterator[Shell]:
         process.kill()
 
 
+class Clock:
+    """Goes as clocks do, and by 10 limits at once whenever so many more processes have reached their misdeed, and what
+    they had said by then is heard: no limit is met before, however slow the machine.
+    """
+
+    TIMEOUT = 3600.0
+
+    def __init__(self, patch: pytest.MonkeyPatch, folder: Path, hanging: int) -> None:
+        self.folder, self.hanging, self.jumps, self.looks = folder / "reached", hanging, 0, 0
+        self.folder.mkdir()
+        self.sleep = time.sleep
+        for name, value in {MARK: folder, "ROUTES_TEST_REACHED": self.folder}.items():
+            patch.setenv(name, str(value))
+        for module in (watching, isolated):
+            patch.setattr(module, "time", self)
+
+    def monotonic(self) -> float:
+        if len(os.listdir(self.folder)) >= self.hanging * (self.jumps + 1):
+            self.looks += 1
+        if self.looks > HEARD * self.hanging:
+            self.jumps, self.looks = self.jumps + 1, 0
+        return time.monotonic() + 10 * self.TIMEOUT * self.jumps
+
+    def run(self, chosen: list[str], jobs: int = 1) -> list[dict]:
+        """Rows by any order."""
+        settings = Settings(timed=False)
+        how = How(limits=Limits(timeout=self.TIMEOUT), jobs=jobs)
+        return [outcome.row for outcome in run(case.problems(chosen), case.routes(["fd-central"]), settings, how)]
+
+
+HEARD = 20  # looks of a watcher, two a tick
+
+
 def faulty(**options: object) -> str:
     return f"{FAULTY}:Faulty[{','.join(f'{name}={value}' for name, value in options.items())}]"
 
@@ -146,29 +184,30 @@ def test_every_misdeed_is_a_row_with_its_reason(started: Shell) -> None:
 
 TRACED = ("nan", "factorize", "take_by_jax")
 
-HANGS = {
-    "hang": ("timeout", "after 10 s of --timeout"),
-    "stubborn": ("timeout", "after 10 s of --timeout"),
-    "escape": ("timeout", "after 10 s of --timeout"),
-    "scribble": ("timeout", "after 10 s of --timeout"),
-    "hang_up": ("crashed", "it hung up and was still running"),
-}
+HANGS = ("hang", "stubborn", "escape", "scribble")
 
 
-def test_what_hangs_is_killed_with_all_that_it_started(started: Shell) -> None:
+def test_what_hangs_is_killed_with_all_that_it_started(started: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
     """Signal handlers do not run in C; half a message on the line to the runner does not stop it either."""
     late = faulty(does="sleep", when=10, halved=True)
-    ran = started.run(
-        *("run", "--json", "--no-timing", "--problem", faulty(does="|".join(HANGS)), "--problem", late),
-        *("--route", "fd-central", "--timeout", "10", "--jobs", "6"),
-    )
-    assert ran.code == 1
-    rows = by_misdeed(ran.rows)
-    for does, (status, says) in HANGS.items():
-        assert (rows[does]["status"], says in rows[does]["reason"]) == (status, True), rows[does]["reason"]
+    clock = Clock(monkeypatch, started.folder, hanging=len(HANGS) + 1)
+    rows = by_misdeed(clock.run([faulty(does="|".join(HANGS)), late], jobs=len(HANGS) + 1))
+    assert clock.jumps == 1, "all of them were at it"
+    for does in HANGS:
+        assert rows[does]["status"] == "timeout", rows[does]["reason"]
+        assert "in its first forward solve" in rows[does]["reason"]
+        assert "after 3600 s of --timeout" in rows[does]["reason"]
     assert rows["sleep"]["status"] == "timeout"
     assert rows["sleep"]["gradient_error"] == pytest.approx(1.0), "a wrong gradient is known whatever comes after it"
     assert "its gradient was known by then, its error 1" in rows["sleep"]["reason"]
+    started.nothing_is_left()
+
+
+def test_what_hangs_up_is_killed_without_a_limit(started: Shell) -> None:
+    ran = started.run("run", "--json", "--no-timing", "--problem", faulty(does="hang_up"), "--route", "fd-central")
+    (row,) = ran.rows
+    assert (ran.code, row["status"]) == (1, "crashed")
+    assert "it hung up and was still running" in row["reason"]
     started.nothing_is_left()
 
 
@@ -364,15 +403,18 @@ from faulty import Faulty
 """
 
 
-def test_a_file_may_misbehave_in_a_worker_only(started: Shell) -> None:
+def test_a_file_may_misbehave_in_a_worker_only(started: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
     """While it is imported there: the survey of sizes goes on, too."""
     (started.folder / "faulty.py").write_text(FAULTY.read_text())
-    misdeeds = {"hangs": "ctypes.PyDLL(None).sleep(987)", "leaves": "os._exit(0)", "raises": "1 / 0"}
+    reached = "open(os.environ['ROUTES_TEST_REACHED'] + f'/{os.getpid()}', 'w').close()"
+    misdeeds = {"hangs": f"{reached}; ctypes.PyDLL(None).sleep(987)", "leaves": "os._exit(0)", "raises": "1 / 0"}
     for name, misdeed in misdeeds.items():
         (started.folder / f"{name}.py").write_text(IMPORTED.format(misdeed))
-    chosen = [word for name in (*misdeeds, "faulty") for word in ("--problem", f"{name}.py:Faulty")]
-    ran = started.run("run", "--json", *chosen, "--route", "fd-central", "--min-time", "0", "--timeout", "8")
-    rows = {row["problem"].partition(".")[0]: row for row in ran.rows}
+    clock = Clock(monkeypatch, started.folder, hanging=1)
+    monkeypatch.chdir(started.folder)
+    found = clock.run([f"{name}.py:Faulty" for name in (*misdeeds, "faulty")])
+    assert clock.jumps == 2, "in the survey, and as a case"
+    rows = {row["problem"].partition(".")[0]: row for row in found}
     assert {name: row["status"] for name, row in rows.items()} == {
         "hangs": "timeout", "leaves": "crashed", "raises": "crashed", "faulty": "ok",
     }  # fmt: skip
@@ -398,10 +440,6 @@ def test_what_c_prints_is_no_result_without_processes_either(started: Shell) -> 
 
 
 def test_no_descriptor_is_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    from bench import case
-    from bench.runner import How, run
-    from bench.workbench import Settings
-
     problems, routes = case.problems([faulty(does="nothing|exit")]), case.routes(["fd-central"])
     settings, how = Settings(timed=False), How(limits=Limits(timeout=PATIENCE))
     counts = []

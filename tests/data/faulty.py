@@ -23,6 +23,7 @@ C.malloc.restype = ctypes.c_void_p
 SLEEPS = [sys.executable, "-c", "import time; time.sleep(987)"]
 TAKES = [sys.executable, "-c", "held = []\nwhile True: held.append(bytearray(b'x' * 10**7))"]
 MEGABYTE = 10**6
+REACHED = "ROUTES_TEST_REACHED"  # names a folder for what has been reached
 
 
 class Faulty(Problem):
@@ -46,6 +47,8 @@ class Faulty(Problem):
     def value(self, p: Array) -> float:
         self.calls += 1
         if self.calls == self.when:
+            if self.does != "nothing":
+                reached()
             MISDEEDS[self.does]()
         _ = np.ones(int(len(p) * self.taken * MEGABYTE / 8))
         return float("nan") if self.does == "nan" else 0.5 * float(p @ p)
@@ -97,6 +100,12 @@ class Leaving(Sound):
 
 class Chatty(Sound):
     does = "garbage"
+
+
+def reached() -> None:
+    """A file that says that this process is now at its misdeed."""
+    if REACHED in os.environ:
+        open(os.path.join(os.environ[REACHED], str(os.getpid())), "w").close()
 
 
 def sleep() -> None:
