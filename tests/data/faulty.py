@@ -21,7 +21,15 @@ from routes.route import Result, Work, route
 C = ctypes.CDLL(None)
 C.malloc.restype = ctypes.c_void_p
 SLEEPS = [sys.executable, "-c", "import time; time.sleep(987)"]
-TAKES = [sys.executable, "-c", "held = []\nwhile True: held.append(bytearray(b'x' * 10**7))"]
+HOARD = """import time
+held = []
+try:
+    while True:
+        held.append(bytearray(b"x" * 10**6))
+except MemoryError:
+    time.sleep(987)  # within its own cap, not within that of the group
+"""
+TAKES = [sys.executable, "-c", HOARD]
 MEGABYTE = 10**6
 REACHED = "ROUTES_TEST_REACHED"  # names a folder for what has been reached
 
