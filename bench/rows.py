@@ -168,13 +168,12 @@ def as_record(row: Row) -> tuple[Any, ...]:
     return tuple(record)
 
 
-def from_record(record: dict[str, Any]) -> Row:
-    """The row that `as_record` wrote."""
+def from_record(record: Row) -> Row:
+    """The row that `as_record` wrote, from its columns with objects parsed."""
     row = empty_row()
     for column in COLUMNS:
         if column.name in record:
-            value = record[column.name]
-            row[column.name] = json.loads(value) if column.json and value is not None else value
+            row[column.name] = record[column.name]
     for prefix, name in WORK_PREFIX.items():
         work = {kind: record.get(f"{prefix}_{kind}") for kind in KINDS}
         row[name] = None if None in work.values() else work

@@ -104,10 +104,31 @@ class Store:
             cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
             return [d[0] for d in cursor.description], cursor.fetchall()
 
+    def records(self, name: str) -> list[Row]:
+        """The rows of a table by column, objects parsed, columns of a newer schema absent. Raises InputError where a
+        value is not what its column holds.
+        """
+        names, values = self.table(name)
+        return [self._parsed(name, dict(zip(names, record, strict=True))) for record in values]
+
+    def _parsed(self, table: str, record: Row) -> Row:
+        row: Row = dict.fromkeys(column.name for column in TABLES[table]) | record
+        for column in TABLES[table]:
+            value = row[column.name]
+            if column.json and value is not None:
+                try:
+                    row[column.name] = json.loads(value)
+                except (ValueError, TypeError, RecursionError) as error:
+                    key, number = next(iter(record.items()))
+                    where = f"{table}, {key} {number}, {column.name}"
+                    raise InputError(
+                        f"store {self.path}: {where}: no JSON ({error}) - delete that row, or name another store"
+                    ) from error
+        return row
+
     def rows(self) -> list[Row]:
         """The cases as rows again."""
-        names, records = self.table("cases")
-        return [from_record(dict(zip(names, record, strict=True))) for record in records]
+        return [from_record(record) for record in self.records("cases")]
 
     def latest(self, case_key: str | None = None) -> dict[str, Row]:
         """The newest row of every case by its case_key, or of the one given; none where there is no store yet."""
@@ -120,7 +141,8 @@ class Store:
                 return {}  # of an older schema
             cursor = db.execute(f"SELECT * FROM cases WHERE case_id IN ({newest})", {"case_key": case_key})
             names = [d[0] for d in cursor.description]
-            rows = [from_record(dict(zip(names, record, strict=True))) for record in cursor]
+            records = [dict(zip(names, record, strict=True)) for record in cursor]
+        rows = [from_record(self._parsed("cases", record)) for record in records]
         return {row["case_key"]: row for row in rows}
 
     @contextmanager

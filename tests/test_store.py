@@ -200,6 +200,20 @@ def test_a_kill_loses_at_most_the_case_in_flight(tmp_path: Path, seed: int) -> N
     assert len(store.rows()) == len(kept) + 1
 
 
+@pytest.mark.parametrize(
+    "verb", ["report", "status", "baseline", "compare results/routes.sqlite results/routes.sqlite"]
+)
+def test_a_value_that_is_none_of_its_column_is_named(cli, verb: str) -> None:
+    store = Store("results/routes.sqlite")
+    store.append(row(problem_options={}, route_options={}, case_key="a"), None)
+    with closing(sqlite3.connect(store.path)) as db:
+        db.execute("UPDATE cases SET problem_options = '{broken'")
+        db.commit()
+    ran = cli(*verb.split())
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "cases, case_id 1, problem_options: no JSON" in ran.err
+
+
 def test_an_empty_file_is_an_empty_store(tmp_path: Path) -> None:
     """What a kill before the first commit leaves."""
     store = Store(tmp_path / "s.sqlite")

@@ -6,7 +6,6 @@ import json
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from bench.environment import Environment
 from bench.rows import ENVIRONMENTS, Row, from_record
@@ -83,14 +82,9 @@ def of_store(store: Store) -> Measured:
     return Measured(str(store.path), tuple(cases), tuple(verdicts))
 
 
-def _records(store: Store, table: str) -> list[dict[str, Any]]:
-    names, records = store.table(table)
-    return [dict(zip(names, record, strict=True)) for record in records]
-
-
 def _cases(store: Store) -> list[Case]:
     environments, latest = _environments(store), {}
-    for record in _records(store, "cases"):
+    for record in store.records("cases"):
         row = from_record(record)
         case = Case({name: row[name] for name in KEPT}, environments.get(record["environment_id"], {}))
         latest[case.key] = record["case_id"], case
@@ -100,11 +94,8 @@ def _cases(store: Store) -> list[Case]:
 
 def _environments(store: Store) -> Mapping[str, Environment]:
     return {
-        record["environment_id"]: {
-            c.name: json.loads(record[c.name]) if c.json and record[c.name] else record[c.name]
-            for c in ENVIRONMENTS[1:]
-        }
-        for record in _records(store, "environments")
+        record["environment_id"]: {column.name: record[column.name] for column in ENVIRONMENTS[1:]}
+        for record in store.records("environments")
     }
 
 
@@ -125,7 +116,7 @@ def _times(store: Store, of: set[int]) -> dict[int, tuple[tuple[float, ...], flo
 
 def _verdicts(store: Store) -> list[Verdict]:
     latest = {}
-    for record in _records(store, "checks"):
+    for record in store.records("checks"):
         verdict = Verdict(record["problem"], record["route"], record["at"], record["verdict"])
         latest[verdict.key] = verdict
     return list(latest.values())

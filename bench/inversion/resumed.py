@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from bench.case import ProblemSpec, RouteSpec
-from bench.rows import Row, clean
+from bench.rows import clean
 from bench.store import Store
 from problems.errors import InputError
 from problems.problem import Array
@@ -28,7 +27,7 @@ def last_estimate(path: Path, spec: ProblemSpec, route: RouteSpec, optimizer: st
         "optimizer": optimizer,
         "at": at,
     }
-    same = [row for row in _records(store, "estimates") if all(row[name] == value for name, value in asked.items())]
+    same = [row for row in store.records("estimates") if all(row[name] == value for name, value in asked.items())]
     if not same:
         raise InputError(
             f"--resume: store {path} holds no run of {spec.name} by {route.name}, {optimizer}, with these options"
@@ -36,15 +35,7 @@ def last_estimate(path: Path, spec: ProblemSpec, route: RouteSpec, optimizer: st
         )
     study, label = same[-1]["study_id"], same[-1]["label"]
     p = np.array([row["estimate"] for row in same if (row["study_id"], row["label"]) == (study, label)])
-    steps = _records(store, "inversion")
-    before = [row["iteration"] for row in steps if (row["study_id"], row["label"]) == (study, label)]
-    return p, max(before, default=0)
-
-
-def _records(store: Store, table: str) -> list[Row]:
-    names, records = store.table(table)
-    rows = [dict(zip(names, record, strict=True)) for record in records]
-    return [
-        row | {name: json.loads(row[name]) for name in ("problem_options", "route_options") if row[name] is not None}
-        for row in rows
+    before = [
+        row["iteration"] for row in store.records("inversion") if (row["study_id"], row["label"]) == (study, label)
     ]
+    return p, max(before, default=0)

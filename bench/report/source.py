@@ -6,7 +6,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
 
 from bench.registry import Kind
 from bench.rows import COLUMNS, Column, Row, from_record
@@ -58,32 +57,24 @@ class Source:
 
 def read(store: Store) -> Source:
     """Everything a report shows. Raises InputError where there is no store."""
-    cases = objects(store, "cases")
-    found = {name: newest(objects(store, name), ASKED.get(name, ("problem", "route"))) for name in STUDIES}
+    cases = cases_of(store)
+    found = {name: newest(store.records(name), ASKED.get(name, ("problem", "route"))) for name in STUDIES}
     named = {name: [_named(row, STUDIES[name]) for row in rows] for name, rows in found.items()}
     return Source(
         cases=latest(cases),
         kept=len(cases),
-        environments=objects(store, "environments"),
-        studies=objects(store, "studies"),
+        environments=store.records("environments"),
+        studies=store.records("studies"),
         tables=named,
         name=store.path.name,
     )
 
 
-def objects(store: Store, table: str) -> list[Row]:
-    """Rows as dictionaries, what is JSON parsed."""
-    names, records = store.table(table)
-    made = [dict(zip(names, record, strict=True)) for record in records]
-    if table == "cases":
-        return [from_record(row) | {key: row[key] for key in ("case_id", "environment_id")} for row in made]
-    absent = dict.fromkeys(column.name for column in TABLES[table])  # in a store of an older schema
-    columns = [column.name for column in TABLES[table] if column.json]
-    return [absent | row | {name: _parsed(row.get(name)) for name in columns} for row in made]
-
-
-def _parsed(text: str | None) -> Any:
-    return None if text is None else json.loads(text)
+def cases_of(store: Store) -> list[Row]:
+    """The cases, with the numbers of their rows and of their environments."""
+    return [
+        from_record(row) | {key: row[key] for key in ("case_id", "environment_id")} for row in store.records("cases")
+    ]
 
 
 def latest(cases: Sequence[Row]) -> list[Row]:
