@@ -24,6 +24,11 @@ class ProblemSpec:
     options: dict[str, Any]
     build: Any
 
+    @property
+    def selector(self) -> str:
+        """Its name with the options that are not its defaults."""
+        return _written(self.name, self.options, self.build)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return problem_named, (self.name, self.options)  # code is found by its name wherever it is sent
 
@@ -42,8 +47,18 @@ class RouteSpec:
     route: Route
     options: dict[str, Any]
 
+    @property
+    def selector(self) -> str:
+        """Its name with the options that are not its defaults."""
+        return _written(self.name, self.options, self.route)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return route_named, (self.name, self.options)
+
+
+def _written(name: str, given: dict[str, Any], target: Any) -> str:
+    declared = options.options_of(registry.factory_of(target))
+    return selector.written(name, given, {name: option.default for name, option in declared.items()})
 
 
 def problem_named(name: str, options: dict[str, Any]) -> ProblemSpec:

@@ -123,12 +123,11 @@ class Run:
         )
 
     def _title(self, route: RouteSpec, truth: bool) -> None:
-        from bench.inversion.invert import selector
         from bench.views import inversion as view
 
         def title() -> None:
             self.out.print(
-                f"{selector(self.spec)} by {route.name}, {self.engine.optimizer}", style="bold", soft_wrap=True
+                f"{self.spec.selector} by {route.name}, {self.engine.optimizer}", style="bold", soft_wrap=True
             )
             view.heading(self.out, truth)
 

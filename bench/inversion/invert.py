@@ -16,9 +16,7 @@ from bench.inversion.history import History, Iterate, Watch
 from bench.inversion.objective import Evaluation, Objective
 from bench.inversion.optimizers import Limits, Name, optimizer
 from bench.inversion.variables import Positive, Variables
-from bench.options import options_of
 from bench.rows import Row
-from bench.selector import written
 from problems.errors import RoutesError
 from problems.problem import Array, Offers, ParameterView, Problem
 from routes.newton import Solver
@@ -159,7 +157,7 @@ def invert(
         route.options,
         engine.optimizer,
         problem.alpha,
-        f"{selector(spec)} by {_of_route(route)}, {engine.optimizer}",
+        f"{spec.selector} by {route.selector}, {engine.optimizer}",
         tuple(history.iterates),
         problem,
         p_0,
@@ -172,15 +170,6 @@ def invert(
         variables.warning(data(problem, last.p)),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
     )
-
-
-def selector(spec: ProblemSpec) -> str:
-    """The problem without its defaults."""
-    return written(spec.name, spec.options, {n: o.default for n, o in options_of(spec.build).items()})
-
-
-def _of_route(spec: RouteSpec) -> str:
-    return written(spec.name, spec.options, {n: o.default for n, o in options_of(spec.route.function).items()})
 
 
 def data(problem: Problem, p: Array) -> Array | None:

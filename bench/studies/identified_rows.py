@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.options import options_of
-from bench.registry import factory_of
 from bench.rows import Row
-from bench.selector import written
 from bench.studies.identifiability import Identified
 from bench.studies.placement import Placement
 from problems.errors import InputError
@@ -28,13 +25,6 @@ def rows(experiments: Sequence[Identified], placement: Placement | None) -> dict
     return tables if placement is None else tables | {"placement": _placement(experiments[0], placement)}
 
 
-def named(one: Identified) -> str:
-    """Its selector."""
-    spec = one.spec
-    defaults = {name: option.default for name, option in options_of(factory_of(spec.build)).items()}
-    return written(spec.name, spec.options, defaults)
-
-
 def _shared(one: Identified) -> Row:
     return {
         "problem": one.spec.name,
@@ -42,7 +32,7 @@ def _shared(one: Identified) -> Row:
         "at": one.at,
         "n_state": one.problem.n_state,
         "n_param": len(one.state.p),
-        "experiment": named(one),
+        "experiment": one.spec.selector,
     }
 
 

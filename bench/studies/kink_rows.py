@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from bench.case import RouteSpec
 from bench.rows import Row
-from bench.selector import written
 from bench.studies.event import Kink
 from bench.studies.rounding import Trade, width_of
 from bench.study_rows import KINK
@@ -22,12 +20,12 @@ def rows(kink: Kink, trade: Trade | None, what: Row) -> list[Row]:
 
 def of_kink(kink: Kink) -> list[Row]:
     found = [_event(kink)]
-    found += [{"kind": "point", "route": named(spec), **_status(why, "skipped")} for spec, why in kink.skipped]
+    found += [{"kind": "point", "route": spec.selector, **_status(why, "skipped")} for spec, why in kink.skipped]
     for one in kink.slopes:
         found.append(
             {
                 "kind": "point" if one.side is None else "side",
-                "route": named(one.route),
+                "route": one.route.selector,
                 **_status(one.reason),
                 **_visited(kink, one.s, one.side),
                 "side": one.side,
@@ -94,7 +92,7 @@ def of_trade(trade: Trade) -> list[Row]:
     return [
         {
             "kind": "trade",
-            "route": named(trade.route),
+            "route": trade.route.selector,
             **_status(one.reason),
             "s": one.s,
             "width": width_of(one.stop),
@@ -113,11 +111,6 @@ def of_trade(trade: Trade) -> list[Row]:
 
 def _status(reason: str | None, otherwise: str = "failed") -> Row:
     return {"status": "ok" if reason is None else otherwise, "reason": reason}
-
-
-def named(spec: RouteSpec) -> str:
-    """The route's selector."""
-    return written(spec.route.name, spec.options, spec.route.defaults)
 
 
 def word(active_set: Hashable | None) -> str | None:

@@ -9,7 +9,6 @@ from rich.text import Text
 
 from bench.rows import Row
 from bench.studies.identifiability import Identified
-from bench.studies.identified_rows import named
 from bench.studies.placement import Placement
 from bench.views import tables
 from bench.views.format import number
@@ -40,7 +39,7 @@ def show(
     if _in_a_row(first):
         out.print(elements(first, out.width), soft_wrap=wrap)
     out.print()
-    tables.show(out, parameters(first, [row for row in rows["identified"] if row["experiment"] == named(first)]))
+    tables.show(out, parameters(first, [row for row in rows["identified"] if row["experiment"] == first.spec.selector]))
     out.print(Text(LEGEND, style="dim"), soft_wrap=wrap)
     if len(found) > 1:
         out.print()
@@ -55,7 +54,7 @@ def show(
 
 def spectra(found: Sequence[Identified], width: int) -> Text:
     """Singular values against their number, and the noise as a line."""
-    names = [named(one) for one in found]
+    names = [one.spec.selector for one in found]
     longest = max(len(one.svd.s) for one in found)
     series = [
         Series(name, [float(k) for k in range(1, 1 + len(one.svd.s))], one.svd.s.tolist(), mark)
@@ -78,7 +77,7 @@ def says(one: Identified) -> Iterator[Text]:
     counts = ", ".join(f"{int((kinds == kind).sum())} {kind}" for kind in KINDS)
     ratio = f"; singular values {one.svd.s[0]:.3g} to {one.svd.s[-1]:.2g}" if len(one.svd.s) else ""
     yield Text.assemble(
-        (named(one), "bold"),
+        (one.spec.selector, "bold"),
         f": {least}{one.rank} of {n_p} directions identifiable from {one.data} data, above the {floor}{ratio};"
         f" parameters: {counts}",
     )

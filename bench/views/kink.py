@@ -7,7 +7,6 @@ from rich.table import Table
 from rich.text import Text
 
 from bench.studies.event import EXACT, NEAR, Kink, Slope, in_words
-from bench.studies.kink_rows import named
 from bench.views.format import number
 from bench.views.palette import route_style
 from bench.views.panel import panel
@@ -59,7 +58,7 @@ def sides(kink: Kink) -> Table:
         left, right = (next(s for s in kink.on(side) if s.route == spec) for side in ("left", "right"))
         errors = [s.error for s in kink.slopes if s.route == spec and s.side is None and s.error is not None]
         cells = [_slope(left), _slope(right), _error(left), _error(right), number(max(errors, default=None), 2)]
-        table.add_row(Text(named(spec)), *cells, style=route_style(spec.route.name))
+        table.add_row(Text(spec.selector), *cells, style=route_style(spec.route.name))
     event = kink.event
     assert event is not None
     table.add_row("differences of J", number(event.left.backward, 6), number(event.right.forward, 6), style="dim")
@@ -82,7 +81,7 @@ def swept(kink: Kink) -> Table:
         cells = [_slope(of[v.s]) for v in ends] + (
             ["unknown"] if worst is None else [number(worst.error, 2), f"{worst.s:.4g}"]
         )
-        table.add_row(Text(named(spec)), *cells, style=route_style(spec.route.name))
+        table.add_row(Text(spec.selector), *cells, style=route_style(spec.route.name))
     table.add_row("differences of J", *(number(q, 6) for q in (ends[0].forward, ends[1].backward)), style="dim")
     return table
 
@@ -100,7 +99,7 @@ def _error(slope: Slope) -> str:
 def judged(kink: Kink) -> list[str]:
     """Who is exact on both branches, and who is not."""
     worst = {
-        named(spec): max(
+        spec.selector: max(
             (s.error if s.error is not None else float("inf")) for s in kink.slopes if s.route == spec and s.side
         )
         for spec in kink.routes
@@ -164,7 +163,7 @@ def _marks(kink: Kink) -> str:
 
 def remarks(kink: Kink) -> list[str]:
     """Why routes and points are missing, each reason once a route."""
-    lines = [f"skipped: {named(spec)}: {why}" for spec, why in kink.skipped]
+    lines = [f"skipped: {spec.selector}: {why}" for spec, why in kink.skipped]
     failed = [v for v in kink.visits if v.reason is not None]
     if failed:
         lines.append(f"failed: {len(failed)} of {len(kink.visits)} s, first {failed[0].s:g}: {failed[0].reason}")
@@ -172,5 +171,5 @@ def remarks(kink: Kink) -> list[str]:
         missing = [s for s in kink.slopes if s.route == spec and s.reason is not None]
         if missing:
             where = f"{len(missing)} s, first {missing[0].s:g}"
-            lines.append(f"failed: {named(spec)} at {where}: {missing[0].reason}")
+            lines.append(f"failed: {spec.selector} at {where}: {missing[0].reason}")
     return lines

@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from bench.studies.kink_rows import named
 from bench.studies.rounding import Trade, Traded, width_of
 from bench.views.format import number
 from bench.views.kink import WIDEST, aligned
@@ -24,7 +23,7 @@ EXACTLY = (
 
 def show_trade(out: Console, trade: Trade, plots: bool = True) -> None:
     """At s = 1, where the stop is as it was asked for, then where exact contact has its kink; that curve by curve."""
-    wrap, route = not out.is_terminal, named(trade.route)
+    wrap, route = not out.is_terminal, trade.route.selector
     rounded = width_of(trade.rows[0].stop) is not None
     for s in trade.at:
         rows = [row for row in trade.rows if row.s == s]
