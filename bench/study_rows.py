@@ -150,6 +150,7 @@ KINK = (
     Column("newton_iterations", "INTEGER", "1", "of the forward solve"),
 )
 
+PLACE = tuple(Column(axis, "REAL", "m", "where it lives") for axis in "xyz")
 RUN = (
     *PROBLEM,
     Column("route", "TEXT", "", "name of the route that gives gradients"),
@@ -175,9 +176,7 @@ INVERSION = (
 ESTIMATES = (
     *RUN,
     Column("parameter", "TEXT", "", "its name"),
-    Column("x", "REAL", "m", "where it lives"),
-    Column("y", "REAL", "m", "where it lives"),
-    Column("z", "REAL", "m", "where it lives"),
+    *PLACE,
     Column("start", "REAL", "its own", "p_0"),
     Column("estimate", "REAL", "its own", "p at the end"),
     Column("truth", "REAL", "its own", "p behind synthetic data"),
@@ -217,9 +216,7 @@ SPECTRUM = (
 IDENTIFIED = (
     *EXPERIMENT,
     Column("parameter", "TEXT", "", "its name"),
-    Column("x", "REAL", "m", "where it lives"),
-    Column("y", "REAL", "m", "where it lives"),
-    Column("z", "REAL", "m", "where it lives"),
+    *PLACE,
     Column("column_norm", "REAL", "problem's", "|H e_i|, of a natural change of it"),
     Column("kind", "TEXT", "", "seen, weak (below the noise) or blind (exactly zero)"),
     Column("null_share", "REAL", "1", "|P_0 e_i|^2, P_0 onto the directions that are not identifiable"),
@@ -240,9 +237,7 @@ PLACEMENT = (
     Column("criterion", "TEXT", "", "D: log det, A: trace of the posterior covariance"),
     Column("step", "INTEGER", "1", "sensors chosen so far"),
     Column("sensor", "TEXT", "", "what is read"),
-    Column("x", "REAL", "m", "where"),
-    Column("y", "REAL", "m", "where"),
-    Column("z", "REAL", "m", "where"),
+    *PLACE,
     Column("value", "REAL", "1", "of the criterion with it"),
     Column("rank", "INTEGER", "1", "identifiable directions with it"),
 )

@@ -214,9 +214,10 @@ class Advection(Problem):
     def twin(self) -> Advection | None:
         return self._with_data(np.zeros(len(self.seen))) if self.d is None else None
 
-    def observed(self, u: Array) -> Advection:
+    def observed(self, u: Array, seed: int | None = None) -> Advection:
         d = u[self.seen]
-        return self._with_data(d + self.noise * np.random.default_rng(self.seed).standard_normal(d.shape))
+        rng = np.random.default_rng(self.seed if seed is None else seed)
+        return self._with_data(d + self.noise * rng.standard_normal(d.shape))
 
     def _with_data(self, d: Array) -> Advection:
         other = copy.copy(self)  # shares the mesh: no data in it

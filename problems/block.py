@@ -312,10 +312,11 @@ class Block(Problem):
         cases = len(self.mechanics.directions)
         return self._with_data(np.zeros((cases, *self.probes.x.shape))) if self.d is None else None
 
-    def observed(self, u: Array) -> Block:
+    def observed(self, u: Array, seed: int | None = None) -> Block:
         s = self.mechanics.setting(self.mechanics.unknown.truth)
         d = np.stack([self.probes.read(U) for U in self._seen(u, s)])
-        return self._with_data(d + self.noise * np.random.default_rng(self.seed).standard_normal(d.shape))
+        rng = np.random.default_rng(self.seed if seed is None else seed)
+        return self._with_data(d + self.noise * rng.standard_normal(d.shape))
 
     def _with_data(self, d: Array) -> Block:
         other = copy.copy(self)  # shares the geometry and what is compiled: no data in it

@@ -268,8 +268,10 @@ class Problem:
         """The problem whose state at truth() makes this one's synthetic data; None where the data are known."""
         return None
 
-    def observed(self, u: Array) -> Problem:
-        """This problem with the data its sensors read of the state u (n_u,), and noise on them if it was asked for."""
+    def observed(self, u: Array, seed: int | None = None) -> Problem:
+        """This problem with the data its sensors read of the state u (n_u,), and noise on them if it was asked for: the
+        draw of `seed`, None: of its own.
+        """
         raise NotOffered(f"{self.name}: has no synthetic data")
 
     def load_cases(self) -> list[Problem]:

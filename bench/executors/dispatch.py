@@ -101,7 +101,7 @@ class Dispatch:
             job, lost = self._waiting.pop(0)
             parcel = packed(sealed(job), self._limits, os.getcwd())
             with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", "Sending large graph")
+                warnings.filterwarnings("ignore", "Sending large graph")  # references found before go along
                 future = sent(self._client, member.address, "carry", parcel, member.greeting.pid)
             attempt = Attempt(job, lost, member, future)
             self._attempts.append(attempt)

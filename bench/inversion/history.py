@@ -34,7 +34,7 @@ Watch = Callable[[Iterate], None]
 
 @dataclass
 class History:
-    """Accepted steps as they come, each handed to `watch`; p the last. `truth` and the start p_0 for distances."""
+    """Accepted steps as they come, each handed to `watch`. `truth` and the start p_0 are for distances."""
 
     objective: Objective
     truth: Array | None

@@ -17,23 +17,13 @@ from bench.inversion.objective import Evaluation, Objective
 from bench.inversion.optimizers import Limits, Name, optimizer
 from bench.inversion.variables import Positive, Variables
 from bench.rows import Row
+from bench.study_rows import RUN
 from problems.errors import RoutesError
 from problems.problem import Array, Offers, ParameterView, Problem
 from routes.newton import Solver
 from routes.route import Options
 
-SHARED = (
-    "problem",
-    "problem_options",
-    "at",
-    "n_state",
-    "n_param",
-    "route",
-    "route_options",
-    "optimizer",
-    "alpha",
-    "label",
-)
+SHARED = tuple(column.name for column in RUN)
 
 
 @dataclass(frozen=True)
@@ -51,8 +41,8 @@ class Inversion:
     """What came of it: columns as in bench.study_rows, and the arrays behind them.
 
     p, gradient (n_p,) at the end; start p_0; truth where known; view, what the problem shows beside; `end` says why it
-    stopped, and `interrupted` that Ctrl-C did; `scaled` says what the optimizer's numbers are
-    in units of, warning what is wrong with them.
+    stopped, and `interrupted` that Ctrl-C did; `scaled` says what the optimizer's numbers are in units of, `warning`
+    what is wrong with them.
     """
 
     problem: str
@@ -133,7 +123,7 @@ def invert(
     history = History(objective, truth, p_0, watch, offset=offset)
     interrupted = False
     with redirect_stdout(sys.stderr), np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # what optimizers warn of is said at the end
+        warnings.filterwarnings("ignore", "The line search algorithm")  # SciPy's: `end` says it, and why
         try:
             found = objective.start(p)
             history.take(found, objective.doubt())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,10 +68,4 @@ def drawn(spec: ProblemSpec, draws: int) -> list[Problem]:
     if twin is None:
         return [spec.build(**spec.options | {"seed": seed}) for seed in seeds]
     u = Model(twin, CONVERGED).solve(truth).u
-
-    def noisy(seed: int) -> Problem:
-        other = copy(bare)
-        other.seed = seed  # type: ignore[attr-defined]
-        return other.observed(u)
-
-    return [noisy(seed) for seed in seeds]
+    return [bare.observed(u, seed) for seed in seeds]

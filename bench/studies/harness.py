@@ -60,7 +60,7 @@ def wall(route: str, how: How) -> float:
     import jax
 
     def once() -> float:
-        jax.clear_caches()  # type: ignore[no-untyped-call]
+        jax.clear_caches()  # type: ignore[no-untyped-call]  # JAX gives it no types
         return seconds_of(lambda: list(cases("bar", route, how)))[0]
 
     once()

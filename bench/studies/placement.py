@@ -9,7 +9,6 @@ changes them by the determinant lemma and by Sherman & Morrison:
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -123,8 +122,8 @@ def _candidates(problem: Problem, H: Sensitivity, afresh: bool, seed: int) -> tu
         needed = size(8.0 * len(kept) * H.shape[1])
         notes = [f"{room} of {len(kept)} candidates, at random (seed {seed}): what all of them read takes {needed}"]
         kept = np.sort(np.random.default_rng(seed).choice(kept, room, replace=False))
-    label: Callable[[int], str] = lambda j: offered.label(int(kept[j]))  # noqa: E731
-    return Candidates(offered.at[kept], label, None if offered.position is None else offered.position[kept]), notes
+    position = None if offered.position is None else offered.position[kept]
+    return Candidates(offered.at[kept], lambda j: offered.label(int(kept[j])), position), notes
 
 
 def _measured(S_u: Any) -> Array:

@@ -120,6 +120,8 @@ def cells(found: Inversion) -> Text:
         return Text()
     middle = np.unique(position[:, 1].round(9))
     at = np.flatnonzero(np.isclose(position[:, 1], middle[len(middle) // 2]))
+    if len(at) != len(np.unique(position[at, 0].round(9))) * len(np.unique(position[at, 2].round(9))):
+        return Text()  # no grid, or several parameters in one place
     shades = [("estimate", p)] + ([] if found.truth is None else [("truth", found.truth)])
     low, high = (float(f(np.concatenate([v[at] for _, v in shades]))) for f in (np.min, np.max))
     pictures = [_picture(position[at][:, [0, 2]], values[at], low, high) for _, values in shades]
