@@ -53,6 +53,11 @@ class Sensitivity:
         H_v = self.seen.S_u @ self.state(dp)
         return np.asarray(H_v if self.seen.S_p is None else H_v + self.seen.S_p @ dp)
 
+    def blind(self, seed: int = 0) -> Array:
+        """Parameters that no datum depends on, (n_p,): columns of zeros, exact ones under weights of all rows, too."""
+        w = np.random.default_rng(seed).standard_normal(self.shape[0])
+        return np.asarray(self.T @ w == 0.0)
+
     def dense(self) -> Array:
         """H whole, by min(m, n_p) solves."""
         m, n_p = self.shape

@@ -25,7 +25,9 @@ from bench.inversion.optimizers import Limits
 from bench.inversion.tradeoff import trade_off
 from bench.inversion.variables import Variables
 from bench.store import Store
-from problems.problem import Linearization, Offers, Parameters, Problem
+from bench.views.inversion import cells
+from problems.observation import Observation
+from problems.problem import Linearization, Offers, Parameters, ParameterView, Problem
 from routes.newton import Solver
 
 TIGHT = Limits(200, 1e-12)
@@ -193,6 +195,31 @@ def test_a_route_with_another_J_is_found_out_at_the_start() -> None:
     assert inverted("bar", limits=Limits(3, 1e-8)).iterates[0].says is None
 
 
+def test_parameters_that_no_datum_sees_are_told_where_the_problem_does_not_know() -> None:
+    """Read off H, by weights of all its rows, and not off a gradient, which is 0 at the minimum anyway."""
+
+    class Half(Bowl):
+        def observation(self, u, p):
+            return Observation(u[:1], np.zeros(1), np.eye(2)[:1])
+
+    spec = case.ProblemSpec("half", {}, Half)
+    (route,) = case.routes(["adjoint"])
+    found = invert(spec, route, Engine(limits=Limits(5, 1e-8)))
+    assert found.view.blind.tolist() == [False, True]
+    assert [row["blind"] for row in found.tables["estimates"]] == [0, 1]
+
+
+def test_a_slice_masks_what_is_blind_and_shows_no_picture_of_what_is_no_grid() -> None:
+    found = inverted("block[n=4,data=twin,alpha=1e-3]", limits=Limits(1, 1e-8))
+    assert "/" not in str(cells(found))
+    blind = np.arange(64) < 32
+    masked = str(cells(replace(found, view=ParameterView(blind=blind))))
+    assert ", / blind" in masked
+    middle = np.isclose(found.made.parameters.position[:, 1], 0.625)
+    assert masked.count("/") == 1 + 2 * (blind & middle).sum()  # the legend, and two characters a cell
+    assert not cells(inverted("block[n=4,unknown=traction,data=twin,alpha=1e-3]", limits=Limits(1, 1e-8)))
+
+
 def test_a_zero_gradient_at_the_start_is_the_end() -> None:
     (spec,), (route,) = case.problems(["bar"]), case.routes(["adjoint"])
     for optimizer in ("lbfgs", "trust", "descent"):
@@ -354,6 +381,8 @@ def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
         (("--draws", "5"), "and --alpha-sweep"),
         (("--draws", "5", "--alpha-sweep", "1e-3", "1", "3"), "without noise"),
         (("--minibatch", "1"), "--optimizer adam"),
+        (("--rate", "0.5"), "is of --optimizer adam"),
+        (("--seed", "1"), "is of --minibatch"),
         (("--minibatch", "1", "--optimizer", "adam"), "has no load cases"),
         (("--positive", "log"), "a log field is positive already"),
         (("--optimizer", "levenberg-marquardt"), "5 data for 8 parameters"),

@@ -87,6 +87,10 @@ def invert(
     from bench.inversion.optimizers import Limits
 
     _check(iterations, tolerance, rate, draws, alpha_sweep, minibatch, optimizer)
+    if optimizer != "adam":
+        refuse_given(("rate",), "is of --optimizer adam, the others find their steps")
+    if minibatch is None:
+        refuse_given(("seed",), "is of --minibatch")
     spec, specs = one_problem(selector), case.routes(routes)
     writable(kept)
     engine = Engine(optimizer, Limits(iterations, tolerance, rate), solver, positive)

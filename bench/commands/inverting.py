@@ -60,6 +60,7 @@ class Run:
             done.append(found)
             self.interrupted = found.interrupted
             self._say(lambda found=found: view.ended(self.out, found, self.one_shot))
+            self._warn(found)
         if not self.quiet:
             self._show(done)
         return {name: [row for found in done for row in found.tables[name]] for name in ("inversion", "estimates")}
@@ -90,6 +91,7 @@ class Run:
         points = l_curve(self.spec, route, self.engine, alphas, self.at, watch=self._swept)
         self.interrupted = any(point.inversion.interrupted for point in points)
         best = next((point for point in points if point.chosen), points[-1]).inversion
+        self._warn(best)
         if not self.quiet:
             if self.plots:
                 self.out.print(view.curve(points, min(self.out.width, 100)))
@@ -163,6 +165,8 @@ class Run:
         picture = view.cells(done[-1])
         if picture:
             self.out.print(picture)
-        warning = done[-1].warning
-        if warning is not None:
-            complain(f"invert: {warning}")
+
+    @staticmethod
+    def _warn(found: Inversion) -> None:
+        if found.warning is not None:
+            complain(f"invert: {found.warning}")

@@ -6,22 +6,24 @@ import sys
 import warnings
 from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bench.case import ProblemSpec, RouteSpec, point
 from bench.inversion.history import History, Iterate, Watch
-from bench.inversion.objective import Evaluation, Objective
+from bench.inversion.objective import OUTSIDE, Evaluation, Objective
 from bench.inversion.optimizers import Limits, Name, optimizer
 from bench.inversion.variables import Positive, Variables
 from bench.rows import Row
 from bench.study_rows import RUN
 from problems.errors import RoutesError
 from problems.problem import Array, Offers, ParameterView, Problem
+from routes.model import Model
 from routes.newton import Solver
 from routes.route import Options
+from routes.sensitivity import Sensitivity
 
 SHARED = tuple(column.name for column in RUN)
 
@@ -154,7 +156,7 @@ def invert(
         last.p,
         last.gradient,
         truth,
-        view(problem, last),
+        view(problem, last, engine.solver, looked_for=not interrupted),
         end,
         interrupted,
         variables.warning(data(problem, last.p)),
@@ -171,8 +173,19 @@ def data(problem: Problem, p: Array) -> Array | None:
     return None if seen is None else seen.data
 
 
-def view(problem: Problem, found: Evaluation) -> ParameterView:
-    """What the problem shows beside a gradient, forward and adjoint strain say, and which parameters are blind."""
+def view(problem: Problem, found: Evaluation, solver: Solver, looked_for: bool = True) -> ParameterView:
+    """What the problem shows beside a gradient, forward and adjoint strain say, and which parameters are blind: as the
+    problem knows, else, where `looked_for`, by one forward and one adjoint solve that nobody counts.
+    """
     if Offers.SOLVE not in problem.offers:
         return ParameterView()
-    return problem.view(found.p, problem.initial(found.p) if found.u is None else found.u, found.lam)
+    u = problem.initial(found.p) if found.u is None else found.u
+    shown = problem.view(found.p, u, found.lam)
+    seen = problem.observation(u, found.p)
+    if shown.blind is not None or not looked_for or seen is None or not len(seen.data):
+        return shown
+    model = Model(problem, solver)
+    try:
+        return replace(shown, blind=Sensitivity(model, model.solve(found.p)).blind())
+    except OUTSIDE:  # a cold solve may fail where the route came to by small steps: then it is not known
+        return shown

@@ -52,7 +52,9 @@ def of_bare_routes(rows: Sequence[Row]) -> tuple[Series, ...]:
 
 def paying(rows: Sequence[Row]) -> Figure:
     """Error against time."""
-    columns = f"{CASE} gradient_error seconds forward_ratio seconds_q1 seconds_q3 unstable objective reference"
+    columns = (
+        f"{CASE} gradient_error seconds forward_ratio seconds_min seconds_q1 seconds_q3 unstable objective reference"
+    )
     return Figure(
         "error-and-time",
         "What accuracy costs",

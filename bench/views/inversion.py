@@ -114,22 +114,25 @@ def estimates(found: Inversion) -> Table:
 
 
 def cells(found: Inversion) -> Text:
-    """The estimate of a field on a box in its middle slice, cell by cell, beside the truth; dark is low."""
+    """The estimate of a field on a box in its middle slice, cell by cell, beside the truth; blind cells masked."""
     position, p = found.made.parameters.position, found.p
-    if position is None or position.shape[1] != 3 or found.n_param < MANY:
+    if position is None or position.shape[1] != 3 or found.n_param < MANY or not np.isfinite(p).all():
         return Text()
     middle = np.unique(position[:, 1].round(9))
     at = np.flatnonzero(np.isclose(position[:, 1], middle[len(middle) // 2]))
     if len(at) != len(np.unique(position[at, 0].round(9))) * len(np.unique(position[at, 2].round(9))):
         return Text()  # no grid, or several parameters in one place
-    shades = [("estimate", p)] + ([] if found.truth is None else [("truth", found.truth)])
-    low, high = (float(f(np.concatenate([v[at] for _, v in shades]))) for f in (np.min, np.max))
+    blind = found.view.blind
+    masked = p if blind is None else np.where(blind, np.nan, p)
+    shades = [("estimate", masked)] + ([] if found.truth is None else [("truth", found.truth)])
+    low, high = (float(f(np.concatenate([v[at] for _, v in shades]))) for f in (np.nanmin, np.nanmax))
     pictures = [_picture(position[at][:, [0, 2]], values[at], low, high) for _, values in shades]
     width = max(map(len, pictures[0]))
     rows = ["  ".join(name.ljust(width) for name, _ in shades)]
     rows += ["  ".join(parts) for parts in zip(*pictures, strict=True)]
     y = middle[len(middle) // 2]
-    return Text(f"slice y = {y:.3g}, x to the right, z up; ' ' {low:.3g} to '@' {high:.3g}\n" + "\n".join(rows))
+    mask = "" if blind is None or not blind.any() else ", / blind"
+    return Text(f"slice y = {y:.3g}, x to the right, z up; ' ' {low:.3g} to '@' {high:.3g}{mask}\n" + "\n".join(rows))
 
 
 def _picture(xz: Array, values: Array, low: float, high: float) -> list[str]:
@@ -140,7 +143,7 @@ def _picture(xz: Array, values: Array, low: float, high: float) -> list[str]:
     span = (high - low) or 1.0
 
     def tone(value: float) -> str:
-        return "?" if not np.isfinite(value) else tones[min(len(tones) - 1, int((value - low) / span * len(tones)))]
+        return "/" if not np.isfinite(value) else tones[min(len(tones) - 1, int((value - low) / span * len(tones)))]
 
     return ["".join(2 * tone(value) for value in row) for row in grid[::-1]]
 
