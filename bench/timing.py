@@ -28,8 +28,8 @@ class Samples:
 
     @property
     def ratio(self) -> float:
-        """median(gradient) / median(forward)."""
-        return median(self.gradient) / median(self.forward)
+        """Median of the rounds' quotients: what slows the machine down for a while slows both of a round down."""
+        return median(g / f for g, f in zip(self.gradient, self.forward, strict=True))
 
     @property
     def quartiles(self) -> tuple[float, float]:
@@ -94,14 +94,15 @@ class Rounds:
     def _calls(self) -> tuple[int, int]:
         """Gradients and forward solves a sample."""
         if self._repeats is None:
-            once, sample = self.long or self._min_time == 0.0, max(SAMPLE, self._min_time / MOST)
-            self._repeats = (1, 1) if once else (repeats(self._gradient, sample), repeats(self._forward, sample))
+            self._repeats = (1, 1) if self.long or self._min_time == 0.0 else self._calibrated()
         return self._repeats
 
-
-def repeats(call: Callable[[], Any], seconds: float) -> int:
-    """Calls that fill them."""
-    return max(1, math.ceil(seconds / max(mean_of(call, 3), 1e-9)))
+    def _calibrated(self) -> tuple[int, int]:
+        """Calls of each that last as long as one of the longer, and as a sample should: both see the same machine."""
+        once = mean_of(self._gradient, 3), mean_of(self._forward, 3)
+        sample = max(SAMPLE, self._min_time / MOST, *once)
+        gradients, forwards = (max(1, round(sample / max(seconds, 1e-9))) for seconds in once)
+        return gradients, forwards
 
 
 def mean_of(call: Callable[[], Any], calls: int) -> float:

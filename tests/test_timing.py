@@ -48,14 +48,30 @@ def turns(rounds: Rounds) -> int:
 
 def test_rounds_go_on_until_the_gradient_has_run_for_the_least_time(clock: Clock) -> None:
     """In turns that leave room for others; a sample of forward solves beside every one of the gradient."""
-    rounds = Rounds(clock.taking("g", 0.02), clock.taking("f", 0.016), 0.02, 1.0)
+    rounds = Rounds(clock.taking("g", 0.02), clock.taking("f", 0.02), 0.02, 1.0)
     assert turns(rounds) == TURNS
     samples = rounds.samples
     assert samples.calls == 1
     assert len(samples.gradient) == len(samples.forward) == 50
     assert sum(samples.gradient) == pytest.approx(1.0)
-    assert samples.ratio == pytest.approx(1.25)
+    assert samples.ratio == pytest.approx(1.0)
     assert clock.calls[6:10] == ["g", "f", "g", "f"], "three calls of each calibrate"
+
+
+def test_both_of_a_round_last_as_long_as_the_longer_of_them(clock: Clock) -> None:
+    rounds = Rounds(clock.taking("g", 0.03), clock.taking("f", 0.0101), 0.03, 0.3)
+    turns(rounds)
+    assert (clock.calls[6:11], rounds.samples.calls) == (["g", "f", "f", "f", "g"], 1)
+    cheap = Rounds(clock.taking("g", 0.01), clock.taking("f", 0.0401), 0.01, 0.3)
+    turns(cheap)
+    assert cheap.samples.calls == 4
+    assert cheap.samples.ratio == pytest.approx(0.01 / 0.0401)
+
+
+def test_what_slows_a_round_down_slows_both_of_it_down() -> None:
+    """A machine half as fast for some rounds changes both medians, and no quotient."""
+    slow = Samples((3.0, 6.0, 6.0, 3.0, 3.3), (1.0, 2.0, 2.0, 1.0, 1.1))
+    assert slow.ratio == pytest.approx(3.0)
 
 
 def test_short_calls_are_repeated_within_a_sample(clock: Clock) -> None:

@@ -33,7 +33,8 @@ def console(stderr: bool = False) -> Console:
     """A console as wide as the terminal; wide where the output is piped, so that nothing is cut."""
     stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() else PIPED_WIDTH
-    return Console(file=stream, width=width, highlight=False, emoji=False)  # whatever becomes of sys.stdout meanwhile
+    # the stream of now, whatever becomes of sys.stdout; selectors have brackets that are no markup
+    return Console(file=stream, width=width, highlight=False, emoji=False, markup=False)
 
 
 def show(out: Console, table: Table) -> None:
