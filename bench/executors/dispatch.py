@@ -9,11 +9,12 @@ import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from queue import Empty, Queue
+from queue import Empty, SimpleQueue
 
 from distributed import CancelledError, Client, Future, KilledWorker
 
 from bench.executors.crew import Crew, Member, Tell, sent
+from bench.executors.interrupt import Interrupt
 from bench.executors.remote import packed
 from bench.executors.sealed import sealed
 from bench.isolation.limits import Limits
@@ -47,7 +48,7 @@ class Dispatch:
 
     def __init__(self, client: Client, limits: Limits, timed: bool, tell: Tell, patience: float) -> None:
         self._client, self._limits, self._patience = client, limits, patience
-        self._events: Queue[Attempt | None] = Queue()
+        self._events: SimpleQueue[Attempt | None] = SimpleQueue()
         self._crew = Crew(client, timed, tell, lambda: self._events.put(None))
         self._attempts: list[Attempt] = []
         self._waiting: list[tuple[Measure, Lost]] = []
@@ -55,12 +56,14 @@ class Dispatch:
 
     def outcomes(self, jobs: Iterator[Measure]) -> Iterator[Outcome]:
         """Until there are no more jobs. Raises Stranded."""
-        while self._attempts or self._waiting or self._pull(jobs):
-            self._look()
-            for attempt in [attempt for attempt in self._attempts if attempt.member not in self._crew]:
-                yield from self._lose(attempt)
-            self._send(jobs)
-            yield from self._take(self._event())
+        with Interrupt(lambda: self._events.put(None)) as interrupt:
+            while self._attempts or self._waiting or self._pull(jobs):
+                self._look()
+                for attempt in [attempt for attempt in self._attempts if attempt.member not in self._crew]:
+                    yield from self._lose(attempt)
+                self._send(jobs)
+                yield from self._take(self._event())
+                interrupt.heard()
 
     def cancel(self) -> None:
         """Nobody waits for anything any more."""
