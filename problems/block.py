@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from types import SimpleNamespace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from problems import bodies, probes, unknowns
+from problems.block_options import check, lengths
+from problems.displacement_data import DisplacementData
 from problems.elements import ElementName
-from problems.errors import InputError, check_applies
+from problems.errors import InputError
 from problems.inherited import inherited
 from problems.mechanics import Load, Mechanics
 from problems.observation import Candidates, Observation
@@ -21,16 +22,13 @@ from problems.problem import Array, Fields, Linearization, Offers, Operator, Par
 from problems.regularization import WIDTH as JUMP
 from problems.regularization import Phi, Prior
 from problems.supports import Supports, check_clamp
-from problems.unknowns import Setting, Unknown, UnknownName
+from problems.unknowns import FIELDS, MATERIAL, Setting, Unknown, UnknownName
 
 LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
 DIRECTIONS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # of load case 1, 2, 3
 ACROSS = 0.25  # of the traction: pushed sideways a block bends, and far
 TARGET = 0.2  # of the body's height: how far the top should go, where nobody has measured
-MOST = 10**7  # cells, markers, layers: more fit in no memory
 NEARLY_INCOMPRESSIBLE = 0.495
-FIELDS: tuple[UnknownName, ...] = ("modulus", "layers")
-MATERIAL: tuple[UnknownName, ...] = ("modulus", "layers", "constants")
 
 
 class Block(Problem):
@@ -80,23 +78,7 @@ class Block(Problem):
         phi_width: Annotated[float, "jump of log E below which total variation is rounded"] = JUMP,
     ) -> None:
         self._given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        _check_counts(n=n, nx=nx, ny=ny, nz=nz, layers=layers, cases=cases, markers=markers, seed=seed)
-        check_applies(
-            "block",
-            ("mesh", mesh is not None, False, {"n": n != 4, "nx": nx, "ny": ny, "nz": nz, "size": size != "1"}),
-            ("mesh", mesh is not None, False, {"element": element != "hex8"}),
-            ("markers", markers > 0, True, {"face": face != "right", "components": components != "all"}),
-            ("markers", markers > 0, False, {"sensors": sensors}),
-            ("data=FILE", data not in (None, "twin"), False, {"sensors": sensors, "markers": markers}),
-            ("unknown=layers", unknown == "layers", True, {"layers": layers != 4}),
-            ("unknown=shape", unknown == "shape", True, {"surface": surface != "right"}),
-            ("load=displacement", load == "displacement", True, {"displacement": displacement != 0.2}),
-            ("load=displacement", load == "displacement", False, {"traction": traction != 0.2}),
-            ("phi=tv", phi == "tv", True, {"phi_width": phi_width != JUMP}),
-            ("unknown=modulus or layers", unknown in FIELDS, True, {"phi": phi in ("tikhonov", "tv")}),
-        )
-        _check_numbers(nu, traction, displacement, noise, data)
-        _check_unknown(unknown, load, cases, parametrization, derivatives)
+        check(SimpleNamespace(**self._given))
         from problems.materials import LAWS
 
         chosen, by_hand = LAWS[law], derivatives == "hand"
@@ -104,12 +86,8 @@ class Block(Problem):
             raise InputError(f"block: derivatives=hand exist for neo-hookean and mooney-rivlin, not {law} - take ad")
         chosen.check(chosen.of_modulus(1.0, nu))
         cells = nx or n, ny or n, nz or n
-        if math.prod(cells) > MOST or markers > MOST or layers > MOST:
-            raise InputError(
-                f"block: {max(math.prod(cells), markers, layers):g} cells, markers or layers - at most {MOST:g}"
-            )
         self._cells = None if mesh else cells
-        self.body = bodies.read("block", mesh) if mesh else bodies.box("block", element, cells, _lengths(size))
+        self.body = bodies.read("block", mesh) if mesh else bodies.box("block", element, cells, lengths(size))
         body, top = self.body, self.body.surface(loaded)
         clamp = body.surface(clamped).node_set if clamped != "none" else np.zeros(0, dtype=int)
         check_clamp(body, clamp)
@@ -145,35 +123,32 @@ class Block(Problem):
         if amplitude == 0.0 and unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if data is not None and data != "twin":
-            if cases > 1:
-                raise InputError(f"block: data=FILE with cases={cases} - it holds one load case, leave cases out")
-            self._measured(data)
+            self.data = self._measured(data)
         elif markers:
-            self._unmeasured(probes.markers(body, face, markers, components == "in-plane", seed))
+            self.data = self._unmeasured(probes.markers(body, face, markers, components == "in-plane", seed))
         else:
             where = "right" if load == "displacement" and sensors is None else sensors
             facets = top if where is None else body.surface(where)
-            self._unmeasured(probes.at_nodes(body, facets.node_set))
-        if not (supports.index[:, self.probes.nodes] != supports.n_free).any():
+            self.data = self._unmeasured(probes.at_nodes(body, facets.node_set))
+        if self.data.reads_nothing():
             raise InputError("block: all sensors sit on clamped nodes and read zero - choose other points")
 
-    def _measured(self, path: str) -> None:
-        """S and d (1, m, 3) from a file."""
-        self.probes, d = probes.measured(self.body, path)
-        self.d: Array | None = d[None]
+    def _measured(self, path: str) -> DisplacementData:
+        """From a file."""
+        points, d = probes.measured(self.body, path)
         greatest, size = float(np.abs(d).max()), self.body.size
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
+        return DisplacementData(self.mechanics, points, d[None])
 
-    def _unmeasured(self, points: probes.Probes) -> None:
-        """S, and d (cases, m, 3) where the target is one; None for a twin whose state is still to be solved for."""
-        self.probes = points
+    def _unmeasured(self, points: probes.Probes) -> DisplacementData:
+        """The target, or none yet for a twin."""
         height = TARGET * (points.x[:, 2] - self.body.box[0, 2])
         directions = self.mechanics.directions
         if self.mechanics.load == "follower":  # along the normal in every case, only less
             directions = directions[:1] / (1.0 + np.arange(len(directions)))[:, None]
         target = height[None, :, None] * directions[:, None]
-        self.d = None if self.twin_data else target
+        return DisplacementData(self.mechanics, points, None if self.twin_data else target, self.noise)
 
     def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: UnknownName) -> Prior:
         """Neighbours are cells with a facet in common, and layers one above the other."""
@@ -202,8 +177,7 @@ class Block(Problem):
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 sum over load cases of |S u - d|^2, and alpha Phi [m^2]."""
-        d, U = self._data(), self._seen(u, self.mechanics.setting(p, xp), xp)
-        J = sum(self.probes.misfit(U[case], d[case]) for case in range(len(d)))
+        J = self.data.misfit(u, p, xp)
         return J + self.regularization.value(xp, self._theta(p, xp)) if self.alpha else J
 
     def _theta(self, p: Any, xp: Any = np) -> Any:
@@ -211,81 +185,22 @@ class Block(Problem):
         return p if self.log or self.mechanics.unknown.group is None else xp.log(p)
 
     def observation(self, u: Array, p: Array) -> Observation:
-        d, U = self._data(), self._seen(u, self.mechanics.setting(p))
-        seen, cases = self.probes.seen, range(len(d))
-        predicted = np.concatenate([self.probes.read(U[case])[seen] for case in cases])
-        S_u, by_grip = self._sampling
-        return Observation(
-            predicted,
-            np.concatenate([d[case][seen] for case in cases]),
-            S_u,
-            by_grip if self._moves_grip else None,
-            self.noise,
-            self._datum,
-        )
-
-    @property
-    def _moves_grip(self) -> bool:
-        return self.mechanics.load == "displacement" and self.mechanics.unknown.is_load
-
-    @cached_property
-    def _sampling(self) -> tuple[Any, Array]:
-        """What is read, datum by datum: by u (m, n_u), sparse, and by the amplitude of a grip (m, 1)."""
-        from scipy import sparse
-
-        supports, probes, cases = self.mechanics.supports, self.probes, len(self.mechanics.directions)
-        points, components = np.nonzero(probes.seen)
-        N, blocks, grips = probes.N[points], [], []
-        for case in range(cases):
-            at = supports.index[case][probes.nodes[points], components[:, None]]  # (m, k)
-            rows = np.broadcast_to(np.arange(len(points))[:, None], at.shape)
-            entries = (N.ravel(), (rows.ravel(), at.ravel()))
-            S = sparse.csr_array(entries, shape=(len(points), supports.n_free + 2))
-            blocks.append(S[:, : supports.n_free])
-            grips.append(S[:, [supports.n_free + 1]].toarray())
-        return sparse.block_diag(blocks, format="csr"), np.concatenate(grips)
-
-    def _datum(self, k: int) -> str:
-        points, components = np.nonzero(self.probes.seen)
-        case, k = divmod(k, len(points))
-        return self._reading(int(components[k]), self.probes.x[points[k]], case)
-
-    def _reading(self, component: int, x: Array, case: int) -> str:
-        which = f", case {case + 1}" if len(self.mechanics.directions) > 1 else ""
-        return f"u_{'xyz'[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){which}"
+        return self.data.observation(u, p)
 
     def candidates(self) -> Candidates:
-        """Every free displacement component of every node, in every load case."""
-        supports, X = self.mechanics.supports, self.body.geometry.X
-        case, node, component = np.nonzero(supports.index < supports.n_free)
-        at = case * supports.n_free + supports.index[case, node, component]
-        return Candidates(at, lambda j: self._reading(int(component[j]), X[node[j]], int(case[j])), X[node])
+        return self.data.candidates()
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         theta = self._theta(p)
         return self.regularization, theta, np.ones_like(p) if theta is p else 1.0 / p
 
-    def _seen(self, u: Any, s: Setting, xp: Any = np) -> list[Any]:
-        """Displacements of the nodes the probes read, (m, k, 3) each load case."""
-        cases = range(len(self.mechanics.directions))
-        return [self.mechanics.displacements(u, s, case, self.probes.nodes, xp) for case in cases]
-
-    def _data(self) -> Array:
-        if self.d is None:
-            raise InputError(
-                "block: data=twin are not made yet - solve for them: routes.twin.with_synthetic_data(block)"
-            )
-        return self.d
-
     def linearize(self, u: Array, p: Array) -> Linearization:
-        d, U = self._data(), self._seen(u, self.mechanics.setting(p))
-        forces = [self.probes.misfit_gradient(U[case], d[case]) for case in range(len(d))]
-        pairs = [self.mechanics.supports.gather(f, self.probes.nodes, case) for case, f in enumerate(forces)]
-        J_p = np.full_like(p, sum(by_grip for _, by_grip in pairs) if self._moves_grip else 0.0)
+        J_u, J_a = self.data.misfit_gradient(u, p)
+        J_p = np.full_like(p, J_a if self.mechanics.moves_grip else 0.0)
         if self.alpha:
             prior, theta, by_p = self.prior(p)
             J_p = J_p + prior.gradient(theta) * by_p
-        return Linearization(self.mechanics.by_p(u, p), np.concatenate([by_u for by_u, _ in pairs]), J_p)
+        return Linearization(self.mechanics.by_p(u, p), J_u, J_p)
 
     def traced(self) -> Traced:
         from problems.jax64 import jnp
@@ -309,31 +224,22 @@ class Block(Problem):
         return self.mechanics.unknown.truth if self.twin_data else None
 
     def twin(self) -> Block | None:
-        cases = len(self.mechanics.directions)
-        return self._with_data(np.zeros((cases, *self.probes.x.shape))) if self.d is None else None
+        return self._with(self.data.blank()) if self.data.d is None else None
 
     def observed(self, u: Array, seed: int | None = None) -> Block:
-        s = self.mechanics.setting(self.mechanics.unknown.truth)
-        d = np.stack([self.probes.read(U) for U in self._seen(u, s)])
+        setting = self.mechanics.setting(self.mechanics.unknown.truth)
         rng = np.random.default_rng(self.seed if seed is None else seed)
-        return self._with_data(d + self.noise * rng.standard_normal(d.shape))
-
-    def _with_data(self, d: Array) -> Block:
-        other = copy.copy(self)  # shares the geometry and what is compiled: no data in it
-        other.d = d
-        return other
+        return self._with(self.data.made(u, setting, rng))
 
     def load_cases(self) -> list[Problem]:
         """Each with the whole of Phi."""
         cases = len(self.mechanics.directions)
-        return [self._alone(case) for case in range(cases)] if cases > 1 else []
+        return [self._with(self.data.alone(case)) for case in range(cases)] if cases > 1 else []
 
-    def _alone(self, case: int) -> Block:
-        other, supports, of = copy.copy(self), self.mechanics.supports, slice(case, case + 1)
-        other.__dict__.pop("_sampling", None)
-        alone = replace(supports, index=supports.index[of])
-        other.mechanics = replace(self.mechanics, supports=alone, directions=self.mechanics.directions[of])
-        other.d, other.n_state = self._data()[of], alone.n_u
+    def _with(self, data: DisplacementData) -> Block:
+        other = copy.copy(self)  # shares the geometry and what is compiled: no data in it
+        other.data, other.mechanics = data, data.mechanics
+        other.n_state = data.mechanics.supports.n_u
         return other
 
     # --- what a person looks at
@@ -359,45 +265,3 @@ class Block(Problem):
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         x = self.parameters.position
         return ParameterView() if x is None else ParameterView(dict(zip("xyz", x.T, strict=True)))
-
-
-def _check_counts(**counts: int | None) -> None:
-    least = {"markers": 0, "seed": 0}
-    for name, count in counts.items():
-        if count is not None and count < least.get(name, 1):
-            raise InputError(f"block: {name}={count} - choose {name} >= {least.get(name, 1)}")
-    if (counts["cases"] or 0) > len(DIRECTIONS):
-        raise InputError(f"block: cases={counts['cases']} - there are 1 to {len(DIRECTIONS)}: along z, x, y")
-
-
-def _check_numbers(nu: float, traction: float, displacement: float, noise: float, data: str | None) -> None:
-    if not -1.0 < nu < 0.5 - 1e-9:
-        raise InputError(f"block: nu={nu:g} - the laws are compressible, choose -1 < nu < 0.5")
-    if not (math.isfinite(traction) and math.isfinite(displacement)):
-        raise InputError(f"block: traction={traction:g}, displacement={displacement:g} - choose finite ones")
-    if not 0 <= noise < math.inf or (noise and data != "twin"):
-        raise InputError(f"block: noise={noise:g} - choose noise >= 0, for synthetic data (data=twin) only")
-
-
-def _check_unknown(unknown: UnknownName, load: Load, cases: int, parametrization: str | None, derivatives: str) -> None:
-    """What does not go together."""
-    if parametrization is not None and unknown not in ("modulus", "layers"):
-        raise InputError(f"block: parametrization={parametrization} - unknown={unknown} has no moduli, leave it out")
-    if unknown == "traction" and (load != "traction" or cases > 1):
-        raise InputError(
-            f"block: unknown=traction with load={load}, cases={cases} - it takes one case of load=traction"
-        )
-    if derivatives == "hand" and unknown not in MATERIAL:
-        raise InputError(f"block: derivatives=hand are by material constants, not by {unknown} - take derivatives=ad")
-
-
-def _lengths(size: str) -> tuple[float, float, float]:
-    try:
-        lengths = [float(part) for part in str(size).split(",")]
-    except ValueError:
-        lengths = []
-    if len(lengths) == 1:
-        lengths *= 3
-    if len(lengths) != 3 or not all(1e-9 <= L <= 1e9 for L in lengths):
-        raise InputError(f"block: size={size} - give one length or three, such as 1,2,0.5, from 1e-9 to 1e9 m")
-    return lengths[0], lengths[1], lengths[2]

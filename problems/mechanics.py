@@ -8,7 +8,7 @@ p acts through a Setting: constants of the law, positions of the nodes, the load
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -53,6 +53,17 @@ class Mechanics:
     def symmetric(self) -> bool:
         """Whether R_u is: a follower load has no potential."""
         return self.load != "follower"
+
+    @property
+    def moves_grip(self) -> bool:
+        """Whether p is how far the grip goes, and what a grip moves is moved by p with u held."""
+        return self.load == "displacement" and self.unknown.is_load
+
+    def alone(self, case: int) -> Mechanics:
+        """In one load case."""
+        of = slice(case, case + 1)
+        supports = replace(self.supports, index=self.supports.index[of])
+        return replace(self, supports=supports, directions=self.directions[of])
 
     def setting(self, p: Any, xp: Any = np) -> Setting:
         """Constants of the law, positions of the nodes and load at p."""

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from problems.materials import Law
 
 UnknownName = Literal["modulus", "layers", "constants", "traction", "shape", "load"]
+FIELDS: tuple[UnknownName, ...] = ("modulus", "layers")
+MATERIAL: tuple[UnknownName, ...] = ("modulus", "layers", "constants")
 THETA_MAX = 300.0  # exp of it is far from float64's end, and so are its squares
 
 

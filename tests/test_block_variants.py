@@ -145,22 +145,21 @@ def test_markers_read_what_the_shape_functions_say(where: str) -> None:
     for element in ("hex8", "tet4", "tet10"):
         block = Block(**SMALL, element=element, markers=7, face=where, components="in-plane", seed=3)
         H = np.array([[0.1, 0.2, 0.3], [0.0, -0.1, 0.4], [0.2, 0.1, 0.5]])
-        U = block.body.geometry.X @ H.T
-        np.testing.assert_allclose(block.probes.read(U[block.probes.nodes]), block.probes.x @ H.T, atol=1e-14)
+        U, probes = block.body.geometry.X @ H.T, block.data.probes
+        np.testing.assert_allclose(probes.read(U[probes.nodes]), probes.x @ H.T, atol=1e-14)
         normal = 0 if where == "right" else 2
-        np.testing.assert_allclose(block.probes.x[:, normal], 1.0, atol=1e-14)
-        assert block.probes.seen.sum(axis=0).tolist() == [0 if i == normal else 7 for i in range(3)]
+        np.testing.assert_allclose(probes.x[:, normal], 1.0, atol=1e-14)
+        assert probes.seen.sum(axis=0).tolist() == [0 if i == normal else 7 for i in range(3)]
 
 
 def test_measured_points_need_not_be_nodes_nor_whole(tmp_path: Path) -> None:
     path = tmp_path / "d.csv"
     path.write_text("x,y,z,ux,uy,uz\n0.3,0.4,1,0.01,,0.2\n1,1,1,,,0.1\n")
     block = Block(**SMALL, data=str(path))
-    assert block.probes.seen.tolist() == [[True, False, True], [False, False, True]]
+    probes = block.data.probes
+    assert probes.seen.tolist() == [[True, False, True], [False, False, True]]
     U = block.body.geometry.X @ np.diag([0.1, 0.2, 0.3])
-    np.testing.assert_allclose(
-        block.probes.read(U[block.probes.nodes]), [[0.03, 0.08, 0.3], [0.1, 0.2, 0.3]], atol=1e-14
-    )
+    np.testing.assert_allclose(probes.read(U[probes.nodes]), [[0.03, 0.08, 0.3], [0.1, 0.2, 0.3]], atol=1e-14)
 
 
 def test_synthetic_data_are_what_the_truth_would_show() -> None:
@@ -198,7 +197,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"unknown": "traction", "load": "follower"}, "one case of load=traction"),
     ({"unknown": "shape", "surface": "top"}, "choose a free surface"),
     ({"unknown": "layers", "layers": 9}, "choose fewer"),
-    ({"unknown": "load", "parametrization": "raw"}, "leave it out"),
+    ({"unknown": "load", "parametrization": "raw"}, "parametrization needs unknown=modulus or layers"),
     ({"cases": 4}, "cases=4"),
     ({"markers": -1}, "markers=-1"),
     ({"noise": 0.1}, "data=twin"),
