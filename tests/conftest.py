@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import gc
-import json
 import os
-import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +21,7 @@ gc.set_threshold(50_000)  # what JAX traces lives on: looking through it at ever
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from commands import Ran, Shell
 from duffing.problem import Duffing
 
 from bench.cli import main
@@ -39,7 +37,6 @@ from routes.route import Route
 from routes.tangent import tangent
 from routes.unrolled_ad import unrolled_ad
 
-ROOT = Path(__file__).parent.parent
 EXACT = (tangent, adjoint, complex_step, implicit_ad)
 ROUTES = (fd_one_sided, fd_central, *EXACT, unrolled_ad)
 EVERY_FACTORS = [{"factors": f} for f in ("refined", "fresh")]
@@ -101,18 +98,6 @@ def relative_error(g: Array, reference: Array) -> float:
     return float(np.linalg.norm(g - reference) / np.linalg.norm(reference))
 
 
-@dataclass(frozen=True)
-class Ran:
-    code: int
-    out: str
-    err: str
-
-    @property
-    def rows(self) -> list[dict[str, Any]]:
-        """One JSON object a line, nothing else: anything else fails here."""
-        return [json.loads(line, parse_constant=lambda c: pytest.fail(c)) for line in self.out.splitlines()]
-
-
 @pytest.fixture(autouse=True)
 def garbage_of_this_test_only() -> Iterator[None]:
     """Measurements collect garbage first: through all that JAX compiled for earlier tests that would take seconds."""
@@ -138,19 +123,9 @@ def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     return call
 
 
-def with_routes() -> dict[str, str]:
-    """The environment of this process, `routes` being the one beside its Python."""
-    return {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-
-
-def shell(command: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A command as a user types it."""
-    return subprocess.run(
-        command,
-        shell=True,
-        cwd=cwd,
-        env={**with_routes(), **environment},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Shell]:
+    shell = Shell(tmp_path)
+    yield shell
+    for process in shell.alive():
+        process.kill()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, shell
+from commands import ROOT, shell
 
 from bench.store import Store
 

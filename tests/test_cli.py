@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, shell
+from commands import ROOT, shell
 
 from bench.rows import COLUMNS
 from problems.bar import Bar

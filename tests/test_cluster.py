@@ -16,7 +16,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from conftest import ROOT, with_routes
+from commands import ROOT, with_routes
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed: pip install 'gradient-routes[dask]'")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import shell, with_routes
+from commands import shell, with_routes
 
 EVIL = '''
 import numpy as np

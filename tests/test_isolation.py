@@ -2,103 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
-import psutil
 import pytest
-from conftest import ROOT, Ran, with_routes
+from commands import FAULTY, MARK, PATIENCE, Shell, ended, eventually, faulty, words
 
 from bench import case
 from bench.case import ProblemSpec, RouteSpec
 from bench.executors import isolated
 from bench.isolation import process as watching
-from bench.isolation.limits import Limits, affinity_of, memory_of
+from bench.isolation.limits import Limits
 from bench.pruning import Pruning
 from bench.rows import empty_row
 from bench.runner import How, run
 from bench.store import Store
 from bench.workbench import Settings
-from problems.errors import InputError
 from routes.adjoint import adjoint
 
-FAULTY = ROOT / "tests" / "data" / "faulty.py"
-MARK = "ROUTES_TEST"  # a variable that all a test starts inherits, whatever groups and parents it leaves
-PATIENCE = 60.0  # [s] for what takes a moment, on a machine that is busy
-
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-
-
-@dataclass(frozen=True)
-class Shell:
-    """The command line in processes of its own, and what of them is left."""
-
-    folder: Path
-
-    def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            ["routes", *arguments],
-            cwd=self.folder,
-            env={**with_routes(), MARK: str(self.folder), **environment},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="backslashreplace",
-        )
-
-    def run(self, *arguments: str, **environment: str) -> Ran:
-        return ended(self.start(*arguments, **environment))
-
-    def alive(self) -> list[psutil.Process]:
-        """Of all that was started, descendants that have left included."""
-        return [process for process in psutil.process_iter() if self._marked(process)]
-
-    def _marked(self, process: psutil.Process) -> bool:
-        try:
-            return process.environ().get(MARK) == str(self.folder) and process.status() != psutil.STATUS_ZOMBIE
-        except psutil.Error:
-            return False
-
-    def nothing_is_left(self) -> None:
-        eventually(lambda: not self.alive())
-
-    def asleep(self) -> None:
-        """Once a misdeed has begun: its child is there."""
-        eventually(lambda: any("time.sleep(987)" in word for process in self.alive() for word in words(process)))
-
-
-def words(process: psutil.Process) -> list[str]:
-    try:
-        return process.cmdline()
-    except psutil.Error:
-        return []
-
-
-def ended(process: subprocess.Popen[str]) -> Ran:
-    out, err = process.communicate(timeout=2 * PATIENCE)
-    return Ran(process.returncode, out, err)
-
-
-def eventually(holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-@pytest.fixture
-def started(tmp_path: Path) -> Iterator[Shell]:
-    shell = Shell(tmp_path)
-    yield shell
-    for process in shell.alive():
-        process.kill()
 
 
 class Clock:
@@ -132,10 +57,6 @@ class Clock:
 
 
 HEARD = 20  # looks of a watcher, two a tick
-
-
-def faulty(**options: object) -> str:
-    return f"{FAULTY}:Faulty[{','.join(f'{name}={value}' for name, value in options.items())}]"
 
 
 def by_misdeed(rows: list[dict]) -> dict[str, dict]:
@@ -283,70 +204,6 @@ def test_only_the_same_pair_is_pruned() -> None:
     assert not pruned((80, 8), k=2, n=8)
 
 
-VERBS = {
-    "check": (f"{FAULTY}:Sleeping",),
-    "vcurve": ("--problem", faulty(does="sleep", when=0), "--route", "fd-central"),
-    "kink": ("--problem", faulty(does="sleep", when=0)),
-    "tolerance": ("--problem", faulty(does="sleep", when=0)),
-    "unrolling": ("--problem", faulty(does="sleep", when=0)),
-}
-
-
-def test_every_verb_ends_at_its_limit(started: Shell) -> None:
-    """In one line, with an exit code and a row that says so."""
-    running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
-    for verb, process in running.items():
-        ran = ended(process)
-        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less\n"
-        assert (ran.code, ran.out, ran.err) == (1, "", says)
-    names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
-    kept = [dict(zip(names, row, strict=True)) for row in rows]
-    assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(VERBS, "timeout")
-    assert {row["reason"] for row in kept} == {"after 8 s of --timeout"}
-    started.nothing_is_left()
-
-
-@pytest.mark.parametrize(
-    ("given", "code", "says"),
-    [
-        (("check", f"{FAULTY}:Leaving"), 1, "check: crashed: its process ended with exit code 0"),
-        (("check", "--json", f"{FAULTY}:Chatty"), 0, "garbage of C"),
-        (("tolerance", "--problem", faulty(does="leave", when=0)), 1, "tolerance: crashed: its process ended with"),
-        (("tolerance", "--problem", faulty(does="quit", when=0)), 1, "routes: tolerance: SystemExit: 4 - see --debug"),
-        (("unrolling", "--problem", faulty(does="raise", when=0)), 1, "unrolling: ZeroDivisionError"),
-        (
-            ("vcurve", "--problem", faulty(does="take", when=0), "--route", "fd-central", "--memory", "300MB"),
-            1,
-            "vcurve: out-of-memory: MemoryError: Unable to allocate",
-        ),
-    ],
-)
-def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
-    started: Shell, given: tuple[str, ...], code: int, says: str
-) -> None:
-    """An exit code of 0 would mean that a gradient agrees."""
-    ran = started.run(*given, "--no-store")
-    assert ran.code == code, ran.err
-    assert says in ran.err
-    assert "Traceback" not in ran.err
-    if code == 0:
-        assert json.loads(ran.out)["verdict"] == "agrees", "what C prints is no result"
-    else:
-        assert ran.out == ""
-
-
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-@pytest.mark.parametrize("model", ["Sleeping", "Stubborn"])
-def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str) -> None:
-    process = started.start("check", f"{FAULTY}:{model}")
-    started.asleep()
-    process.send_signal(signal.Signals[name])
-    ran = ended(process)
-    assert (ran.code, ran.out, ran.err) == (130, "", "routes: interrupted - nothing is kept\n")
-    started.nothing_is_left()
-    assert not (started.folder / "results" / "routes.sqlite").exists()
-
-
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("jobs", ["1", "3"])
 def test_an_interrupted_run_shows_what_is_done_and_how_to_go_on(started: Shell, jobs: str, name: str) -> None:
@@ -463,33 +320,3 @@ def test_an_allocation_that_superlu_misses_is_no_singular_matrix(monkeypatch: py
     with pytest.raises(MemoryError, match="factors of R_u") as failure:
         Factorizer("superlu")(scipy.sparse.eye_array(3).tocsc(), "x")
     assert status_of(failure.value) == "out-of-memory"
-
-
-@pytest.mark.parametrize("text", ["64", "0", "-1GiB", "GiB", "1XiB", "nan", "inf", "1e30"])
-def test_sizes_that_are_none(text: str) -> None:
-    with pytest.raises(InputError, match="--memory"):
-        memory_of(text)
-
-
-def test_sizes() -> None:
-    texts = {"4GiB": 2**32, "4G": 2**32, "500MB": 500 * 10**6, "1.5 GiB": 3 * 2**29, "100000000": 10**8, "none": None}
-    assert {text: memory_of(text) for text in texts} == texts
-
-
-@pytest.mark.parametrize("text", ["", "a", "0-", "-1", "3-1", "0,,1", "999999", "0-99999999"])
-def test_processors_that_are_none(text: str) -> None:
-    with pytest.raises(InputError, match="--affinity"):
-        affinity_of(text)
-    assert affinity_of(",".join(map(str, os.sched_getaffinity(0)))) == tuple(sorted(os.sched_getaffinity(0)))
-
-
-def test_limits_without_processes_are_refused(cli) -> None:
-    run = ("run", "--problem", "bar", "--route", "adjoint", "--no-store", "--no-isolate")
-    for given, says in (
-        (("--timeout", "3"), "--timeout: holds for processes of their own"),
-        (("--memory", "1GiB"), "--memory: holds for processes of their own"),
-        (("--jobs", "2", "--no-timing"), "--jobs 2: needs processes"),
-        (("--threads", "0"), "--threads 0 - give 1 or more"),
-    ):
-        ran = cli(*run, *given)
-        assert (ran.code, says in ran.err, ran.err.count("\n")) == (2, True, 1), ran.err

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from commands import ROOT
 
 HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "matplotlib"}
 FORBIDDEN = {"problems": {"routes", "bench"}, "routes": {"bench"}}

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, shell
+from commands import ROOT, shell
 
 FD = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "fd-extrapolated": 1e-10}
 

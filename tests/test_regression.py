@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, shell
+from commands import ROOT, shell
 
 from bench.gate.regression import FACTOR, Kernel, again, judge, of_session, read, typical, write
 from problems.errors import InputError

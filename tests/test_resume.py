@@ -11,7 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from conftest import Ran, shell, with_routes
+from commands import Ran, shell, with_routes
 
 from bench import environment, keys, sources
 from bench.resume import state_of

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from conftest import ROOT, shell
+from commands import ROOT, shell
 
 from bench.rows import COLUMNS, SAMPLES, STORED, empty_row
 from bench.store import SCHEMA, Store

@@ -1,0 +1,77 @@
+"""Every verb under limits: it ends in one line with an exit code, and nothing that it started goes on."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+
+import pytest
+from commands import FAULTY, Shell, ended, faulty
+
+from bench.store import Store
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+VERBS = {
+    "check": (f"{FAULTY}:Sleeping",),
+    "vcurve": ("--problem", faulty(does="sleep", when=0), "--route", "fd-central"),
+    "kink": ("--problem", faulty(does="sleep", when=0)),
+    "tolerance": ("--problem", faulty(does="sleep", when=0)),
+    "unrolling": ("--problem", faulty(does="sleep", when=0)),
+}
+
+
+def test_every_verb_ends_at_its_limit(started: Shell) -> None:
+    """In one line, with an exit code and a row that says so."""
+    running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
+    for verb, process in running.items():
+        ran = ended(process)
+        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less\n"
+        assert (ran.code, ran.out, ran.err) == (1, "", says)
+    names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
+    kept = [dict(zip(names, row, strict=True)) for row in rows]
+    assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(VERBS, "timeout")
+    assert {row["reason"] for row in kept} == {"after 8 s of --timeout"}
+    started.nothing_is_left()
+
+
+@pytest.mark.parametrize(
+    ("given", "code", "says"),
+    [
+        (("check", f"{FAULTY}:Leaving"), 1, "check: crashed: its process ended with exit code 0"),
+        (("check", "--json", f"{FAULTY}:Chatty"), 0, "garbage of C"),
+        (("tolerance", "--problem", faulty(does="leave", when=0)), 1, "tolerance: crashed: its process ended with"),
+        (("tolerance", "--problem", faulty(does="quit", when=0)), 1, "routes: tolerance: SystemExit: 4 - see --debug"),
+        (("unrolling", "--problem", faulty(does="raise", when=0)), 1, "unrolling: ZeroDivisionError"),
+        (
+            ("vcurve", "--problem", faulty(does="take", when=0), "--route", "fd-central", "--memory", "300MB"),
+            1,
+            "vcurve: out-of-memory: MemoryError: Unable to allocate",
+        ),
+    ],
+)
+def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
+    started: Shell, given: tuple[str, ...], code: int, says: str
+) -> None:
+    """An exit code of 0 would mean that a gradient agrees."""
+    ran = started.run(*given, "--no-store")
+    assert ran.code == code, ran.err
+    assert says in ran.err
+    assert "Traceback" not in ran.err
+    if code == 0:
+        assert json.loads(ran.out)["verdict"] == "agrees", "what C prints is no result"
+    else:
+        assert ran.out == ""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("model", ["Sleeping", "Stubborn"])
+def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str) -> None:
+    process = started.start("check", f"{FAULTY}:{model}")
+    started.asleep()
+    process.send_signal(signal.Signals[name])
+    ran = ended(process)
+    assert (ran.code, ran.out, ran.err) == (130, "", "routes: interrupted - nothing is kept\n")
+    started.nothing_is_left()
+    assert not (started.folder / "results" / "routes.sqlite").exists()
