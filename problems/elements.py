@@ -17,6 +17,7 @@ from problems.problem import Array
 
 ElementName = Literal["hex8", "tet4", "tet10"]
 QUADRATURE = {"hex8": (2, 2), "tet4": (1, 2), "tet10": (2, 4)}  # polynomial orders inside and on facets
+SETTLED = 1e-12  # of reference coordinates: a Newton step after one so small is rounding
 CONGRUENT = 1e-13  # relative deviation of shape functions' gradients: positions are rounded
 # meshio's name and order of nodes, for cells whose det J is positive and negative in scikit-fem's order
 MESHIO = {
@@ -178,9 +179,12 @@ class Geometry:
             N, dN = self.element.shape_functions(xi.T)
             r = np.einsum("ka,kai->ki", N, X) - x
             cof, det = cofactors(np.einsum("kai,kaj->kij", X, dN), np)
+            before = xi
             xi = np.clip(
                 xi - np.einsum("kij,ki->kj", cof, r) / det[:, None], -4.0, 5.0
             )  # far outside, the map may fold
+            if np.abs(xi - before).max() <= SETTLED:  # after two steps where all maps are affine
+                break
         reached = np.abs(r).max(axis=1) <= 1e-9 * np.ptp(X, axis=1).max(axis=1)
         outside = np.where(reached, self.element.outside(xi), np.inf)
         best = int(outside.argmin())

@@ -41,7 +41,7 @@ SMALL = ("bar[n=1]", "bar[raw,alpha]", "duffing", "block[n=2]")
 
 
 def parts() -> Iterator[tuple[str, str, Route, dict]]:
-    yield from ((part, *case) for part in PARTS for case in pairs() if case[0] in SMALL)
+    yield from ((part, *case) for part in PARTS for case in pairs(iterated=("bar[raw,alpha]",)) if case[0] in SMALL)
 
 
 def whole(problem: Problem, few: Restricted, p: Array) -> Reference:

@@ -32,11 +32,22 @@ ZOO = zoo()
 ACCURACY = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "unrolled-ad": 1e-9}
 
 
-def pairs(routes: tuple[Route, ...] = ROUTES) -> Iterator[tuple[str, Route, dict]]:
-    for name, problem in ZOO.items():
+ITERATIONS = ("cg", "richardson", "jacobi")  # of unrolled AD, which compile anew for every k
+SIZES = ("bar", "bar[n=1]", "bar[n=2]")
+
+
+def pairs(routes: tuple[Route, ...] = ROUTES, iterated: tuple[str, ...] = SIZES) -> Iterator[tuple[str, Route, dict]]:
+    """Every problem with every route and option, but for the iterations of unrolled AD: every one on the problems
+    `iterated`, one on each of the others. They see K, f and J as numbers, whatever p and the data are."""
+    for number, (name, problem) in enumerate(ZOO.items()):
         for route in routes:
             for options in options_of(route, problem):
-                yield name, route, options
+                if (
+                    options.get("inner") not in ITERATIONS
+                    or name in iterated
+                    or ITERATIONS[number % 3] == options["inner"]
+                ):
+                    yield name, route, options
 
 
 def ids(value: object) -> str | None:
@@ -94,8 +105,8 @@ def test_every_route_gives_the_gradient(name: str, route: Route, options: dict) 
 
 
 def without_iterations(name: str, options: dict) -> bool:
-    """Whether a case has no iterations of unrolled AD, which compile anew for every k, or has them on the bar."""
-    return options.get("inner", "direct") == "direct" or name == "bar"
+    """Whether a case has no iterations of unrolled AD, or has them on the bar."""
+    return options.get("inner") not in ITERATIONS or name == "bar"
 
 
 @pytest.mark.parametrize(
