@@ -13,6 +13,7 @@ from typing import Any
 
 LONG = 1.0  # [s] gradients that take longer are timed once, not repeated
 SAMPLE = 1e-3  # [s] of a sample: the clock and the call of a function are nothing beside it
+AVERAGED = 0.1  # [s] over which a machine's short disturbances average out
 LEAST, MOST = 5, 100  # rounds, where --min-time asks for any repeats at all
 TURNS = 5  # in which a case has its rounds, others having theirs between
 SPREAD = 0.10  # of the median, between the quartiles: beyond, a timing is not to be relied upon
@@ -56,7 +57,7 @@ def seconds_of(call: Callable[[], Any]) -> tuple[float, Any]:
 class Rounds:
     """Samples of a gradient, each followed by one of forward solves, until the gradient has run for `min_time` s.
 
-    Calls a sample are calibrated by three more. min_time 0: one round of one call.
+    Calls a sample are calibrated by up to three more. min_time 0: one round of one call.
     """
 
     def __init__(self, gradient: Callable[[], Any], forward: Callable[[], Any], first_s: float, min_time: float):
@@ -98,11 +99,17 @@ class Rounds:
         return self._repeats
 
     def _calibrated(self) -> tuple[int, int]:
-        """Calls of each that last as long as one of the longer, and as a sample should: both see the same machine."""
-        once = mean_of(self._gradient, 3), mean_of(self._forward, 3)
-        sample = max(SAMPLE, self._min_time / MOST, *once)
+        """Calls of each that last as long as one of the longer, up to a limit: both see the same machine."""
+        once = typical(self._gradient), typical(self._forward)
+        sample = max(SAMPLE, self._min_time / MOST, min(AVERAGED, max(once)))
         gradients, forwards = (max(1, round(sample / max(seconds, 1e-9))) for seconds in once)
         return gradients, forwards
+
+
+def typical(call: Callable[[], Any]) -> float:
+    """Seconds of one call, of some more where it is short."""
+    seconds, _ = seconds_of(call)
+    return seconds if seconds > AVERAGED else mean_of(call, 2)
 
 
 def mean_of(call: Callable[[], Any], calls: int) -> float:

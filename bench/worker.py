@@ -45,8 +45,8 @@ class Job(Protocol):
 
 @dataclass(frozen=True)
 class Measure:
-    """One case. Says: environment, known (phase, row), and refused or done at the end; ready before it is timed, in
-    turns that it is told to take."""
+    """One case. Says: environment, known (phase, row), and refused or done at the end; ready, with references it found,
+    before it is timed, in turns that it is told to take."""
 
     problem: ProblemSpec
     route: RouteSpec

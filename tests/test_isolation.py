@@ -144,6 +144,27 @@ def test_a_case_that_ends_while_it_is_timed_leaves_the_others_alone(started: She
     assert rows["fd-central"]["interleaved"] == rows["fd-one-sided"]["interleaved"] == 3
 
 
+KNOWN = """
+import os
+from problems.bar import Bar
+
+class Known(Bar):
+    def reference(self, p):
+        with open("asked", "a") as file:
+            file.write(f"{os.getpid()}\\n")
+        return super().reference(p)
+"""
+
+
+def test_a_reference_is_found_once_for_all_that_wait_for_their_timing(started: Shell) -> None:
+    (started.folder / "known.py").write_text(KNOWN)
+    routes = [word for route in ("adjoint", "tangent", "fd-central") for word in ("--route", route)]
+    ran = started.run("run", "--json", "--min-time", "0", "--problem", "known.py:Known", *routes)
+    assert [(row["status"], row["reference"]) for row in ran.rows] == [("ok", "closed form")] * 3
+    assert {row["interleaved"] for row in ran.rows} == {3}
+    assert len((started.folder / "asked").read_text().split()) == 1
+
+
 def test_a_daemon_stops_nobody(started: Shell) -> None:
     """It has left group and parent, and is out of reach; that it holds the lines open must not matter."""
     ran = started.run("run", "--json", "--problem", faulty(does="daemonize"), "--route", "fd-central")

@@ -68,6 +68,12 @@ def test_both_of_a_round_last_as_long_as_the_longer_of_them(clock: Clock) -> Non
     assert cheap.samples.ratio == pytest.approx(0.01 / 0.0401)
 
 
+def test_forward_solves_beside_a_long_gradient_need_not_last_as_long(clock: Clock) -> None:
+    rounds = Rounds(clock.taking("g", 0.9), clock.taking("f", 0.01), 0.9, 0.5)
+    turns(rounds)
+    assert clock.calls == ["g", *"fff", *(["g", *"f" * 10] * LEAST)], "one call of what is long calibrates it"
+
+
 def test_what_slows_a_round_down_slows_both_of_it_down() -> None:
     """A machine half as fast for some rounds changes both medians, and no quotient."""
     slow = Samples((3.0, 6.0, 6.0, 3.0, 3.3), (1.0, 2.0, 2.0, 1.0, 1.1))

@@ -152,7 +152,8 @@ class Isolated:
         elif kind == "known":
             self._phase, self._row = what
         elif kind == "ready":
-            self.long = what
+            self.long, found = what
+            self.found.update(found)  # for cases that are prepared before this one is done
         elif kind == "turned":
             self._more = what
         elif kind == "refused":
