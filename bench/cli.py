@@ -16,7 +16,7 @@ from bench.commands.compare import baseline, compare
 from bench.commands.identify import identify
 from bench.commands.invert import invert
 from bench.commands.kink import kink
-from bench.commands.limited import INSIDE
+from bench.commands.limited import FINISHED, Inside
 from bench.commands.report import report
 from bench.commands.run import run
 from bench.commands.scaling import scaling
@@ -52,9 +52,9 @@ class Routes(click.Group):
             complain(f"{error.format_message()} - see {about} --help")
             ctx.exit(WRONG_USAGE)
         except KeyboardInterrupt as interrupt:
-            what = "what is finished is printed, and kept unless --no-store"
             hint = " ".join(map(str, interrupt.args))
-            complain(f"interrupted - {what if ctx.invoked_subcommand in KEEPING else 'nothing is kept'}{hint}")
+            if not (isinstance(ctx.obj, Inside) and ctx.obj.expired):
+                complain(f"interrupted - {FINISHED if ctx.invoked_subcommand in KEEPING else 'nothing is kept'}{hint}")
             leave(INTERRUPTED)
         except (BrokenPipeError, click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
             raise  # click ends, quietly where whoever read has read enough
@@ -68,7 +68,7 @@ class Routes(click.Group):
 
             if debugging():
                 traceback.print_exc()
-            if ctx.obj == INSIDE and status_of(failure) == "out-of-memory":
+            if isinstance(ctx.obj, Inside) and status_of(failure) == "out-of-memory":
                 raise  # the process that watches this one says and keeps it
             complain(f"{ctx.invoked_subcommand}: {one_line(failure)} - see --debug")
             ctx.exit(WRONG_USAGE if ctx.invoked_subcommand in READING else FAILED)

@@ -5,10 +5,16 @@ from __future__ import annotations
 import json
 import signal
 import sys
+import time
+from pathlib import Path
 
 import pytest
 from commands import FAULTY, Shell, ended, faulty
 
+from bench.cli import KEEPING
+from bench.commands import limited
+from bench.commands.limited import FINISHED
+from bench.isolation import process as watching
 from bench.store import Store
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -27,13 +33,54 @@ def test_every_verb_ends_at_its_limit(started: Shell) -> None:
     running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
     for verb, process in running.items():
         ran = ended(process)
-        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less\n"
+        finished = f"; {FINISHED}" if verb in KEEPING else ""
+        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less{finished}\n"
         assert (ran.code, ran.out, ran.err) == (1, "", says)
     names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
     kept = [dict(zip(names, row, strict=True)) for row in rows]
     assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(VERBS, "timeout")
     assert {row["reason"] for row in kept} == {"after 8 s of --timeout"}
     started.nothing_is_left()
+
+
+COUNTED = """
+from problems.bar import Bar
+
+class Counted(Bar):
+    def linearize(self, u, p):
+        with open("gradients", "a") as file:
+            file.write(".")
+        return super().linearize(u, p)
+"""
+ENDLESS = {
+    "invert": ("--optimizer", "descent", "--tolerance", "0", "--iterations", "100000"),
+    "tolerance": ("--route", "adjoint", "--tightest", "1e-12", "--per-decade", "1000", "--budget", "inf"),
+}
+
+
+@pytest.mark.parametrize("verb", ENDLESS)
+def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
+    verb: str, cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The limit is met once there are some gradients, however long that takes."""
+    (tmp_path / "counted.py").write_text(COUNTED)
+    file = tmp_path / "gradients"
+
+    class Late:
+        @staticmethod
+        def monotonic() -> float:
+            return time.monotonic() + (7200.0 if file.exists() and len(file.read_text()) > 9 else 0.0)
+
+    for module in (limited, watching):
+        monkeypatch.setattr(module, "time", Late)
+    ran = cli(verb, "--problem", "counted.py:Counted", "--json", "--isolate", *ENDLESS[verb])
+    told = f"{verb}: timeout: after 3600 s of --timeout - raise the limit, or ask for less; {FINISHED}"
+    assert (ran.code, ran.err) == (1, f"routes: {told}\n")
+    table = "inversion" if verb == "invert" else verb
+    kept = Store(tmp_path / "results" / "routes.sqlite").records(table)
+    shown = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert sum(row["table"] == table for row in shown) == len(kept) > 0
+    assert verb != "invert" or kept[-1]["says"] == "interrupted"
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ RESUME = "From where the last run of the same (problem, route, optimizer, start)
 @no_plot_option
 @json_option
 @store_options
-@confined()
+@confined(keeps=True)
 @debug_option
 def invert(
     selector: str,
@@ -78,8 +78,8 @@ def invert(
     routes invert --problem 'bar[noise=1e-3]' --alpha-sweep 1e-8 1 9     how much regularization
     routes invert --problem bar --route adjoint --route fd-central       the same answer, two bills
 
-    Exit code: 0 ended (converged or not, the last line says which), 1 J cannot be had at the start, 2 wrong usage,
-    130 interrupted; what was found by then is shown and kept.
+    Exit code: 0 ended (converged or not, the last line says which), 1 J cannot be had at the start, or --timeout is
+    over, 2 wrong usage, 130 interrupted. What was found by then is shown and kept.
     """
     from bench import case
     from bench.commands.inverting import Run

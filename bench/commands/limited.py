@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -23,16 +23,24 @@ if TYPE_CHECKING:
     from bench.isolation.process import Confined
 
 FAILED, INTERRUPTED = 1, 130
-GRACE = 5.0  # [s] between an interrupt and the end of what does not react to it
-INSIDE = "inside"  # the context's object in a process that is confined already
+FINISHED = "what is finished is printed, and kept unless --no-store"
+GRACE = 10.0  # [s] between an interrupt and the end of what does not react to it
+STOPS = "Seconds of wall time, after which {} is stopped, and 10 s later killed with all it started; inf: none."
 ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
-TIMEOUT = "Seconds of wall time, after which {} is killed with all it started; inf: none."
+KILLS = "Seconds of wall time, after which {} is killed with all it started; inf: none."
 MEMORY = "Resident memory at which it is killed: 4GiB, 500MB. [what the machine has]"
 THREADS = "Threads of BLAS, PARDISO and XLA each."
 AFFINITY = "Processors to stay on: 0 or 0,2-3. [any]"
 
 
-def limit_options(what: str, timeout: float) -> Callable[[Command], Command]:
+@dataclass
+class Inside:
+    """The context's object in a process that is confined already."""
+
+    expired: bool = False  # its time is over, and it is being stopped: the process that watches it says so
+
+
+def limit_options(what: str, timeout: float, ends: str = KILLS) -> Callable[[Command], Command]:
     """--isolate, --timeout, --memory, --threads, --affinity; the command gets `isolate` and `limits`."""
 
     def decorate(command: Command) -> Command:
@@ -56,7 +64,7 @@ def limit_options(what: str, timeout: float) -> Callable[[Command], Command]:
 
         options = (
             click.option("--isolate/--no-isolate", default=True, show_default=True, help=ISOLATE),
-            click.option("--timeout", type=float, default=timeout, show_default=True, help=TIMEOUT.format(what)),
+            click.option("--timeout", type=float, default=timeout, show_default=True, help=ends.format(what)),
             click.option("--memory", metavar="SIZE", help=MEMORY),
             click.option("--threads", type=int, default=1, show_default=True, help=THREADS),
             click.option("--affinity", metavar="LIST", help=AFFINITY),
@@ -69,20 +77,23 @@ def limit_options(what: str, timeout: float) -> Callable[[Command], Command]:
     return decorate
 
 
-def confined(timeout: float = 3600.0) -> Callable[[Command], Command]:
-    """The whole verb in a process of its own, this one watching. It writes where this one writes."""
+def confined(timeout: float = 3600.0, keeps: bool = False) -> Callable[[Command], Command]:
+    """The whole verb in a process of its own, this one watching. It writes where this one writes.
+
+    One that `keeps` what it has when it is interrupted is interrupted at its limit of time, before it is killed.
+    """
 
     def decorate(command: Command) -> Command:
         @wraps(command)
         def apart(*, isolate: bool, limits: Limits, **others: Any) -> Any:
             context = click.get_current_context()
-            if isolate and context.find_root().obj != INSIDE:
-                raise click.exceptions.Exit(_watched(context.info_name or "", limits, others.get("kept")))
+            if isolate and not isinstance(context.find_root().obj, Inside):
+                raise click.exceptions.Exit(_watched(context.info_name or "", limits, keeps, others.get("kept")))
             if not isolate:
                 pin(limits)
             return command(**others)
 
-        return limit_options("it", timeout)(apart)
+        return limit_options("it", timeout, STOPS if keeps else KILLS)(apart)
 
     return decorate
 
@@ -98,21 +109,23 @@ def pin(limits: Limits) -> None:
         os.sched_setaffinity(0, limits.affinity)
 
 
-def _watched(verb: str, limits: Limits, kept: Any) -> int:
+def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
     """Its exit code. A limit is said in a line and kept as a study that came to nothing."""
-    from bench.isolation.command import ENDED
+    from bench.isolation.command import ENDED, EXPIRED
     from bench.isolation.process import Confined, Killed
 
     given = json.dumps(asdict(limits) | {"timeout": None})
     reader, writer = os.pipe()
     arguments = [given, str(os.getpid()), str(writer), *sys.argv[1:]]
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # what was started ends, too
-    process = Confined("bench.isolation.command", arguments, limits, talkative=True, pass_fds=[writer])
+    last = (EXPIRED, GRACE) if keeps else None
+    process = Confined("bench.isolation.command", arguments, limits, talkative=True, last_words=last, pass_fds=[writer])
     os.close(writer)
     try:
         process.watch(process.ended, time.monotonic() + limits.timeout)
     except Killed as limit:
-        return _ended(verb, limit.status, limit.reason, "raise the limit, or ask for less", process, kept)
+        left = f"; {FINISHED}" if keeps and limit.status == "timeout" else ""
+        return _ended(verb, limit.status, limit.reason, f"raise the limit, or ask for less{left}", process, kept)
     except KeyboardInterrupt:
         return _interrupted(process)
     code = process.process.wait()

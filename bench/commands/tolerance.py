@@ -57,7 +57,7 @@ TIGHT = 1e-12
 @no_plot_option
 @json_option
 @store_options
-@confined()
+@confined(keeps=True)
 @debug_option
 def tolerance(
     selector: str,
@@ -81,7 +81,7 @@ def tolerance(
     unrolled AD differentiates another iterate.
 
     Exit code: 0 measured (a tolerance that is not met is a row that says so), 1 the problem cannot be solved at all,
-    2 wrong usage, 130 interrupted.
+    or --timeout is over, 2 wrong usage, 130 interrupted. What was measured by then is shown and kept.
     """
     from bench import case
     from bench.studies import tolerance as study

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
+from types import FrameType
 
 from bench.isolation.inside import submit_to
 from bench.isolation.limits import Limits
 
 ENDED = "ended"
+EXPIRED = signal.SIGALRM  # its time is over: it ends as if interrupted
 
 
 def main() -> None:
@@ -24,10 +27,17 @@ def main() -> None:
     submit_to(limits, int(parent))
     sys.argv = ["routes", *arguments]
     from bench.cli import main as routes
-    from bench.commands.limited import INSIDE
+    from bench.commands.limited import Inside
 
+    inside = Inside()
+
+    def expire(number: int, frame: FrameType | None) -> None:
+        inside.expired = True
+        raise KeyboardInterrupt
+
+    signal.signal(EXPIRED, expire)
     try:
-        routes(arguments, prog_name="routes", obj=INSIDE)
+        routes(arguments, prog_name="routes", obj=inside)
     except SystemExit:  # how click ends
         os.write(int(line), ENDED.encode())
         raise

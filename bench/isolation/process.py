@@ -23,7 +23,7 @@ TICK = 0.1  # [s] between two looks at its memory
 GRACE = 5.0  # [s] for the end of what has hung up
 KEPT = 20_000  # bytes of stderr
 LAST = 60  # lines of it
-WRITES = 0.2  # [s] it is given to write its stack
+STACK = None if ASKED is None else (ASKED, 0.2)  # it has so many seconds to write its stack
 EXHAUSTED = (
     *("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory"),
     "Memory allocation still failed",  # OpenBLAS
@@ -49,16 +49,24 @@ class Ending:
 class Confined:
     """`python -P -m MODULE ARGUMENTS` under limits.
 
-    watch(until, deadline) waits; kill() ends it and everything it started; stderr is its last lines. Out of reach is
-    what has left its process group and lost its parent, too: a daemon.
+    watch(until, deadline) waits; kill() ends it and everything it started; stderr is its last lines. `last_words` are
+    a signal it gets at its deadline, and the seconds it then has. Out of reach is what has left its process group and
+    lost its parent, too: a daemon.
     """
 
     def __init__(
-        self, module: str, arguments: Sequence[str], limits: Limits, *, talkative: bool = False, **popen: Any
+        self,
+        module: str,
+        arguments: Sequence[str],
+        limits: Limits,
+        *,
+        talkative: bool = False,
+        last_words: tuple[int, float] | None = STACK,
+        **popen: Any,
     ) -> None:
         self.limits = limits
         self._oom_kills = _oom_kills()
-        self._talkative, self._stderr = talkative, bytearray()
+        self._talkative, self._stderr, self._last_words = talkative, bytearray(), last_words
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", module, *arguments],
             env={**os.environ, **limits.environment},
@@ -80,16 +88,16 @@ class Confined:
                 self.kill()
                 raise Killed("out-of-memory", f"{size(taken)} > {size(self.limits.memory)} of --memory")
             if time.monotonic() >= deadline:
-                self._ask_where()
+                self._hear_out()
                 self.kill()
                 raise Killed("timeout", f"after {self.limits.timeout:g} s of --timeout")
 
-    def _ask_where(self) -> None:
-        """It has a moment to write its stack."""
-        if ASKED is not None and not self._talkative:
+    def _hear_out(self) -> None:
+        if self._last_words is not None:
+            number, seconds = self._last_words
             with suppress(OSError):
-                self.process.send_signal(ASKED)
-            time.sleep(WRITES)
+                self.process.send_signal(number)
+            self.ended(seconds)
 
     def ended(self, seconds: float) -> bool:
         """Whether it has, within so many seconds."""
