@@ -259,3 +259,16 @@ def test_the_point_handed_to_routes_is_read_only() -> None:
     p = Workbench(spec, Settings()).p
     assert not p.flags.writeable
     np.testing.assert_array_equal(p, np.zeros(8))
+
+
+def test_control_characters_of_others_reach_no_terminal(cli, tmp_path: Path) -> None:
+    """A store may come from anywhere; a name, a reason or a word of a process may hold what retitles a terminal."""
+    assert cli("run", "--problem", "bar[n=2]", "--route", "adjoint", "--min-time", "0").code == 0
+    wild = "a\x1b[31mb\x07\x9b2J"
+    with closing(sqlite3.connect(tmp_path / "results" / "routes.sqlite")) as db, db:
+        db.execute("UPDATE cases SET problem = ?, reason = ?, stderr = ?, status = 'crashed'", (wild, wild, wild))
+    for command in ("status", "report", "report --format md -o r.md", "compare results/routes.sqlite b\x1b[31m.json"):
+        ran = cli(*command.split())
+        said = ran.out + ran.err + ((tmp_path / "r.md").read_text() if "md" in command else "")
+        assert said.count("[31m") > 0, command
+        assert not [c for c in said if not c.isprintable() and c != "\n"], command

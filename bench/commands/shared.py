@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from bench.plain import plain
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def checked(budget: float) -> float:
 
 def complain(what: str) -> None:
     """One line on stderr, whatever a name in it holds."""
-    click.echo(f"routes: {' '.join(what.split())}", err=True)
+    click.echo(f"routes: {plain(' '.join(what.split()))}", err=True)
 
 
 def debugging() -> bool:

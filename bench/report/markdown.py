@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
+from bench.plain import plain
 from bench.report.cell import heading, shown
 from bench.report.figure import Figure, Section, Table
 from bench.report.source import Source
@@ -58,7 +59,7 @@ def table(numbers: Table) -> str:
 
 def escaped(words: str) -> str:
     """Nothing in it is markup, or a second line."""
-    line = " ".join(words.split())
+    line = plain(" ".join(words.split()))
     return SPECIAL.sub(r"\\\1", line if len(line) <= LONGEST else f"{line[: LONGEST - 1]}…")
 
 
@@ -66,4 +67,4 @@ def fenced(words: str) -> str:
     """A block of code whose fence is longer than any in it."""
     longest = max((len(run) for run in re.findall(r"`+", words)), default=0)
     fence = "`" * max(3, longest + 1)
-    return f"{fence}\n{words}\n{fence}"
+    return f"{fence}\n{plain(words)}\n{fence}"

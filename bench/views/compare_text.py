@@ -7,6 +7,7 @@ from typing import Any
 
 from bench.gate.compare import Comparison
 from bench.gate.finding import Finding
+from bench.plain import plain
 from bench.rows import clean
 from bench.views.compare import LEGEND, METRICS, cell, conclusion, lines, names, overview
 
@@ -39,7 +40,7 @@ def _row(problem: str, route: str, by_metric: dict[str, Finding]) -> str:
 
 def _safe(text: str) -> str:
     """What Markdown or HTML would take for its own is escaped; one line."""
-    escaped = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace(" -> ", " → ")
+    escaped = plain(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;").replace(" -> ", " → ")
     return "".join(f"\\{c}" if c in "|*_`[]" else c for c in escaped)
 
 

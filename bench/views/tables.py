@@ -20,6 +20,7 @@ from bench.rows import ANSWERED, Row
 from bench.selector import written
 from bench.views.format import bytes_, number, ratio, seconds
 from bench.views.palette import route_style
+from bench.views.terminal import Terminal
 from problems.errors import InputError
 from routes.tally import Work
 
@@ -34,7 +35,7 @@ def console(stderr: bool = False) -> Console:
     stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() else PIPED_WIDTH
     # the stream of now, whatever becomes of sys.stdout; selectors have brackets that are no markup
-    return Console(file=stream, width=width, highlight=False, emoji=False, markup=False)
+    return Terminal(file=stream, width=width, highlight=False, emoji=False, markup=False)
 
 
 def show(out: Console, table: Table) -> None:
