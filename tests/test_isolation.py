@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -315,6 +316,20 @@ def test_what_c_prints_is_no_result_without_processes_either(started: Shell) -> 
         chosen = ("--problem", faulty(does="garbage", when=when), "--problem", "bar", "--route", "fd-central")
         ran = started.run("run", "--json", "--no-isolate", "--min-time", "0", "--no-store", *chosen)
         assert [row["status"] for row in ran.rows] == ["ok", "ok"]
+
+
+def test_a_late_reader_reads_nothing_of_the_next_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whose line may have the descriptor of the last."""
+    received = Connection._recv
+
+    def late(descriptor: int, size: int) -> bytes:
+        time.sleep(0.1)
+        return os.read(descriptor, size)
+
+    monkeypatch.setattr(Connection, "_recv", lambda self, size: received(self, size, read=late))
+    problems, routes = case.problems([faulty(n="1|2|3")]), case.routes(["fd-central"])
+    settings, how = Settings(timed=False), How(limits=Limits(timeout=PATIENCE))
+    assert [o.row["status"] for o in run(problems, routes, settings, how)] == ["ok"] * 3
 
 
 def test_no_descriptor_is_left_open(monkeypatch: pytest.MonkeyPatch) -> None:

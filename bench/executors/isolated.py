@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -49,7 +50,8 @@ class Line:
             self.connection.send(job)
         self._heard: SimpleQueue[Any] = SimpleQueue()
         self._message: Any = None
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listening = threading.Thread(target=self._listen, daemon=True)
+        self._listening.start()
 
     def hear(self) -> tuple[str, Any]:
         """Its next message. Raises Killed at a limit, EOFError where it has ended, with no word or a broken one."""
@@ -87,10 +89,14 @@ class Line:
             self.connection.send((kind, what))
 
     def close(self) -> None:
-        """Whatever it and its children are at, it ends."""
+        """Whatever it and its children are at, it ends; who listens does before the line's descriptor is given away,
+        or it would read on from the next that gets it.
+        """
         self.process.kill()
-        with suppress(OSError):
-            self.connection.close()
+        with suppress(OSError), socket.fromfd(self.connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as line:
+            line.shutdown(socket.SHUT_RDWR)  # a daemon may hold the other end open
+        self._listening.join()
+        self.connection.close()
 
 
 class Isolated:
