@@ -111,7 +111,7 @@ class Site:
         file = folder / "scheduler.json"
         arguments = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
         self.scheduler = stack.enter_context(started("distributed.cli.dask_scheduler", *arguments, **environment))
-        until(file.exists)
+        until(lambda: file.exists() and file.read_text().strip().endswith("}"))  # it is not written at once
         self.address = json.loads(file.read_text())["address"]
 
     @contextmanager
