@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bench.environment import Environment
 from bench.rows import Row
 from bench.timing import Samples
-from problems.errors import NotConverged, RoutesError
+from problems.errors import DomainError, InputError, NotConverged, RoutesError
 from problems.problem import Array, Fields, ParameterView, Reference
 
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
@@ -92,6 +92,12 @@ def status_of(failure: BaseException) -> str:
 def note(row: Row, what: str) -> None:
     """Something to be read beside the numbers."""
     row["note"] = f"{row['note']}; {what}" if row["note"] else what
+
+
+def bare(error: InputError | DomainError) -> InputError | DomainError:
+    """Without what a subclass of others adds: that might not be put together again in another process."""
+    kind = DomainError if isinstance(error, DomainError) else InputError
+    return kind(str(error))
 
 
 def one_line(error: BaseException) -> str:

@@ -7,7 +7,7 @@ from bench.executors.isolated import Line
 from bench.foreign_output import stdout_to_stderr
 from bench.isolation.limits import Limits
 from bench.isolation.process import Killed
-from bench.outcome import FOREIGN
+from bench.outcome import FOREIGN, bare
 from bench.pruning import Size
 from bench.workbench import Settings
 from bench.worker import Survey
@@ -39,7 +39,7 @@ def surveyed(problem: ProblemSpec, at: str) -> Size | RoutesError | None:
         with stdout_to_stderr():
             return sized(problem, at)
     except (InputError, DomainError) as error:
-        return error
+        return bare(error)
     except FOREIGN:
         return None
 

@@ -59,7 +59,7 @@ class Measure:
         """Files that have changed since the runner took their key end it: a row must not stand under another's name."""
         from bench.environment import environment
         from bench.measurement import measure
-        from bench.outcome import FOREIGN, Outcome, outdated, unbuilt
+        from bench.outcome import FOREIGN, Outcome, bare, outdated, unbuilt
         from bench.sources import changed
         from bench.workbench import Workbench
         from problems.errors import DomainError, InputError
@@ -70,7 +70,7 @@ class Measure:
         try:
             bench = Workbench(self.problem, self.settings, self.found)
         except (InputError, DomainError) as error:
-            channel.say("refused", error)
+            channel.say("refused", bare(error))
             return
         except FOREIGN as failure:
             channel.say("done", (unbuilt(row, self.problem.name, failure), {}))

@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 import pty
 import select
+import signal
 import sqlite3
 import subprocess
 import sys
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from commands import ROOT, shell
 
 from bench.rows import COLUMNS
+from bench.store import Store
 from problems.bar import Bar
 from routes.tally import KINDS
 
@@ -305,6 +308,19 @@ def test_a_terminal_gets_a_progress_bar_for_more_than_one_case(tmp_path: Path) -
 
     assert "cases" in screen("bar[n=1|2]")
     assert "cases" not in screen("bar")
+
+
+def test_a_row_that_is_being_kept_is_kept_whatever_interrupts(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    append = Store.append
+
+    def interrupted(*arguments: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return append(*arguments)
+
+    monkeypatch.setattr(Store, "append", interrupted)
+    ran = cli("run", "--problem", "bar[n=2|3]", "--route", "adjoint", "--min-time", "0", "--json")
+    assert ran.code == 130
+    assert len(ran.rows) == len(Store(Path("results/routes.sqlite")).rows()) == 1
 
 
 def test_an_interrupt_keeps_and_shows_what_was_measured(tmp_path: Path) -> None:

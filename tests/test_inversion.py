@@ -17,7 +17,7 @@ import pytest
 
 from bench import case
 from bench.inversion.invert import Engine, Inversion, invert
-from bench.inversion.lcurve import Point, chosen, l_curve
+from bench.inversion.lcurve import Point, chosen, l_curve, minima
 from bench.inversion.minibatch import minibatched
 from bench.inversion.objective import Objective
 from bench.inversion.one_shot import one_shot
@@ -268,7 +268,7 @@ def test_where_u_is_affine_in_p_one_solve_is_the_answer(problem: str) -> None:
 
 def test_the_discrepancy_principle_takes_the_largest_alpha_that_meets_the_noise() -> None:
     (spec,), (route,) = case.problems(["bar[n=6,sensors=6,noise=0.003,seed=3]"]), case.routes(["adjoint"])
-    points = l_curve(spec, route, Engine(limits=Limits(200, 1e-8)), np.geomspace(1e-7, 1.0, 8))
+    points = l_curve(list(minima(spec, route, Engine(limits=Limits(200, 1e-8)), np.geomspace(1e-7, 1.0, 8))))
     alphas, misfits, phis = (np.array([p.row[name] for p in points]) for name in ("alpha", "misfit", "phi"))
     assert (np.diff(alphas) < 0).all()
     assert (np.diff(misfits) < 0).all()
@@ -313,7 +313,7 @@ def test_bias_falls_and_variance_rises_as_regularization_goes() -> None:
     """Their sum is the mean square distance of the draws to the truth, each inverted by itself."""
     (spec,), (route,) = case.problems(["bar[n=6,sensors=6,noise=0.003]"]), case.routes(["adjoint"])
     engine = Engine(limits=Limits(200, 1e-8))
-    trades = trade_off(spec, route, engine, [1e-1, 1e-3, 1e-5], 6)
+    trades = list(trade_off(spec, route, engine, [1e-1, 1e-3, 1e-5], 6))
     bias, variance, total = ([trade.row[name] for trade in trades] for name in ("bias", "variance", "total"))
     assert bias[0] > 3 * bias[1]
     assert variance[0] < variance[1] < variance[2]
@@ -397,6 +397,52 @@ def test_wrong_usage_is_one_line(cli, arguments: tuple[str, ...], says: str) -> 
     ran = cli("invert", "--problem", "bar", *arguments)
     assert (ran.code, says in ran.err) == (2, True), ran.err
     assert ran.err.count("\n") == 1
+
+
+ENDING = """
+from problems.bar import Bar
+from problems.problem import Offers
+from routes.route import Work, route
+
+@route("ending", needs=Offers.LINEARIZE, cost=lambda n_p, forward, **options: Work())
+def ending(model, p):
+    raise {}
+
+class Ending(Bar):
+    gradients = 0
+
+    def linearize(self, u, p):
+        Ending.gradients += 1
+        if Ending.gradients == {}:
+            raise {}
+        return super().linearize(u, p)
+"""
+ENDINGS = {"KeyboardInterrupt()": (130, "interrupted"), "ValueError('mine')": (1, "invert: ValueError: mine")}
+
+
+@pytest.mark.parametrize("failure", ENDINGS)
+def test_what_ends_a_route_ends_nothing_of_those_before(cli, failure: str) -> None:
+    Path("ending.py").write_text(ENDING.format(failure, 0, failure))
+    ran = cli("invert", "--problem", "bar", "--route", "adjoint", "--route", "ending.py:ending", "--no-plot")
+    code, says = ENDINGS[failure]
+    assert (ran.code, says in ran.err, ran.err.count("\n")) == (code, True, 1), ran.err
+    rows = Store(Path("results/routes.sqlite")).records("inversion")
+    assert {row["route"] for row in rows} == {"adjoint"}
+    assert rows[-1]["says"].startswith("converged")
+    assert "to reach a misfit of" in ran.out
+
+
+@pytest.mark.parametrize("failure", ENDINGS)
+@pytest.mark.parametrize(("draws", "table"), [((), "lcurve"), (("--draws", "2"), "tradeoff")])
+def test_what_ends_a_sweep_ends_nothing_of_what_was_swept(
+    cli, failure: str, draws: tuple[str, ...], table: str
+) -> None:
+    Path("ending.py").write_text(ENDING.format(failure, 60, failure))
+    swept = ("--alpha-sweep", "1e-4", "1", "8", "--tolerance", "1e-6", *draws)
+    ran = cli("invert", "--problem", "ending.py:Ending[n=6,sensors=6,noise=0.003]", *swept)
+    code, says = ENDINGS[failure]
+    assert (ran.code, says in ran.err, ran.err.count("\n")) == (code, True, 1), ran.err
+    assert 0 < len(Store(Path("results/routes.sqlite")).records(table)) < 8
 
 
 def test_an_interrupt_keeps_what_was_found(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from commands import FAULTY, Shell, ended, faulty
+from commands import FAULTY, Shell, ended, eventually, faulty
 
 from bench.cli import KEEPING
 from bench.commands import limited
@@ -122,3 +122,17 @@ def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, 
     assert (ran.code, ran.out, ran.err) == (130, "", "routes: interrupted - nothing is kept\n")
     started.nothing_is_left()
     assert not (started.folder / "results" / "routes.sqlite").exists()
+
+
+def test_a_group_that_is_told_to_end_keeps_what_it_has(started: Shell) -> None:
+    """Service managers tell all processes at once: the one inside by itself, and by the one that watches it."""
+    (started.folder / "counted.py").write_text(COUNTED)
+    process = started.start("invert", "--problem", "counted.py:Counted", "--no-plot", *ENDLESS["invert"])
+    gradients = started.folder / "gradients"
+    eventually(lambda: gradients.exists() and len(gradients.read_text()) > 9)
+    for each in started.alive():
+        each.send_signal(signal.SIGTERM)
+    ran = ended(process)
+    assert (ran.code, ran.err) == (130, f"routes: interrupted - {FINISHED}\n")
+    assert Store(started.folder / "results" / "routes.sqlite").records("inversion")
+    started.nothing_is_left()

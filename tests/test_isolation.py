@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from multiprocessing.connection import Connection
@@ -73,6 +74,7 @@ ENDS = {
     "leave": ("crashed", "its process ended with exit code 0"),
     "segfault": ("crashed", "its process was ended by SIGSEGV"),
     "abort": ("crashed", "its process was ended by SIGABRT"),
+    "orphan": ("crashed", "its process was ended by SIGABRT"),
     "kill": ("crashed", "its process was ended by SIGKILL"),
     "close": ("crashed", "its process ended with exit code 1"),
     "take": ("out-of-memory", "MemoryError"),
@@ -164,6 +166,38 @@ def test_a_reference_is_found_once_for_all_that_wait_for_their_timing(started: S
     assert [(row["status"], row["reference"]) for row in ran.rows] == [("ok", "closed form")] * 3
     assert {row["interleaved"] for row in ran.rows} == {3}
     assert len((started.folder / "asked").read_text().split()) == 1
+
+
+REFUSING = """
+from problems.bar import Bar
+from problems.errors import DomainError
+
+class Odd(DomainError):
+    def __init__(self, n, what):
+        super().__init__(f"refusing: n={n} {what} - choose an even n")
+
+class Refusing(Bar):
+    def __init__(self, *, n: int = 3):
+        if n % 2:
+            raise Odd(n, "is odd")
+        super().__init__(n=n)
+"""
+
+
+@pytest.mark.parametrize("selector", ["refusing.py:Refusing", "refusing.py:Refusing[n=2|3]"])
+def test_a_refusal_of_others_comes_through(started: Shell, selector: str) -> None:
+    """Although their exception cannot be put together again."""
+    (started.folder / "refusing.py").write_text(REFUSING)
+    ran = started.run("run", "--problem", selector, "--route", "adjoint")
+    assert (ran.code, ran.out, ran.err) == (2, "", "routes: refusing: n=3 is odd - choose an even n\n")
+
+
+def test_a_process_is_killed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its number may be another's afterwards."""
+    process = watching.Confined("timeit", ["-n", "1", "pass"], Limits(), stdout=subprocess.DEVNULL)
+    process.kill()
+    monkeypatch.setattr(os, "killpg", lambda *_: pytest.fail("killed again"))
+    process.kill()
 
 
 def test_a_daemon_stops_nobody(started: Shell) -> None:

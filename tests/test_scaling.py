@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
@@ -257,6 +258,20 @@ def test_an_interrupt_keeps_what_is_measured() -> None:
     assert done.series[0].stopped_by == "interrupted: at n=16"
     with pytest.raises(KeyboardInterrupt):
         scaling(sizes_of("bar", first=16), case.routes(["adjoint"]), QUICK, measure=measure)
+
+
+def test_an_interrupt_between_cases_is_no_end_of_the_sizes() -> None:
+    measure, _ = pretended({})
+
+    def taken(outcome: Outcome) -> None:
+        if outcome.row["n_state"] == 16:
+            signal.raise_signal(signal.SIGINT)
+        kept.append(outcome.row["n_state"])
+
+    kept: list[int] = []
+    done = scaling(sizes_of("bar"), case.routes(["adjoint"]), QUICK, taken, measure)
+    assert (done.interrupted, kept) == (True, [8, 16])
+    assert done.series[0].stopped_by == "interrupted: at n=16"
 
 
 # real routes

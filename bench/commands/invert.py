@@ -103,6 +103,8 @@ def invert(
     if as_json:
         echo_json(tables)
     keep(kept, tables, run.started, quiet=as_json)
+    if run.failure is not None:
+        raise run.failure
     if run.interrupted:
         raise KeyboardInterrupt
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from bench.commands.shared import complain
 from bench.units import now
@@ -21,10 +21,14 @@ if TYPE_CHECKING:
     from problems.problem import Array, Problem
 
 Tables = dict[str, list["Row"]]
+Found = TypeVar("Found")
 
 
 class Run:
-    """One call of the verb: what it shows and what it keeps."""
+    """One call of the verb: what it shows and what it keeps.
+
+    What ends it early, `interrupted` or a `failure`, ends none of what it has found by then.
+    """
 
     def __init__(
         self, spec: ProblemSpec, routes: Sequence[RouteSpec], engine: Engine, at: str, quiet: bool, plots: bool
@@ -33,43 +37,69 @@ class Run:
 
         self.spec, self.routes, self.engine, self.at = spec, routes, engine, at
         self.quiet, self.plots, self.started, self.interrupted = quiet, plots, now(), False
+        self.failure: BaseException | None = None
         self.one_shot: float | None = None
         self.out: Console = console(stderr=quiet)
 
     def each(self, resumed: Path | None, minibatch: int | None, seed: int) -> Tables:
         """Route by route, from where each ended in the store `resumed` if given; then what each has paid."""
-        from bench.inversion.invert import invert
-        from bench.inversion.minibatch import minibatched
         from bench.inversion.resumed import last_estimate
-        from bench.inversion.variables import Variables
-        from bench.views import inversion as view
 
         problem = self.spec()
         starts: list[tuple[Array | None, int]] = [(None, 0)] * len(self.routes)
         if resumed is not None:  # what is not there is refused before anything runs
             starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
         self._baseline(problem)
-        done: list[Inversion] = []
+        done = self._until_it_ends(self._inversions(problem, starts, minibatch, seed))
+        if not self.quiet:
+            self._show(done)
+        return {name: [row for found in done for row in found.tables[name]] for name in ("inversion", "estimates")}
+
+    def _inversions(
+        self, problem: Problem, starts: Sequence[tuple[Array | None, int]], minibatch: int | None, seed: int
+    ) -> Iterator[Inversion]:
+        from bench.inversion.invert import invert
+        from bench.inversion.minibatch import minibatched
+        from bench.inversion.variables import Variables
+        from bench.views import inversion as view
+
         for route, (p, offset) in zip(self.routes, starts, strict=True):
-            if self.interrupted:
-                break
             run = None if minibatch is None else minibatched(problem, route, self.engine, minibatch, seed)
             Variables.of(problem.parameters, problem.parameters.start, self.engine.positive, problem.name)
             self._title(route, problem.truth() is not None)
             found = invert(self.spec, route, self.engine, self.at, p, self._line, problem, run, offset)
-            done.append(found)
             self.interrupted = found.interrupted
+            yield found
             self._say(lambda found=found: view.ended(self.out, found, self.one_shot))
             self._warn(found)
-        if not self.quiet:
-            self._show(done)
-        return {name: [row for found in done for row in found.tables[name]] for name in ("inversion", "estimates")}
+            if found.interrupted:
+                return
+
+    def _until_it_ends(self, each: Iterable[Found]) -> list[Found]:
+        """All of them, or those before an interrupt or a failure, which the verb ends with. Raises either where it has
+        none.
+        """
+        from bench.outcome import FOREIGN
+
+        done: list[Found] = []
+        try:
+            for found in each:
+                done.append(found)  # not all at once: what has come stays
+        except KeyboardInterrupt:
+            self.interrupted = True
+            if not done:
+                raise
+        except FOREIGN as failure:
+            self.failure = failure
+            if not done:
+                raise
+        return done
 
     def sweep(self, given: tuple[float, float, int], draws: int | None) -> Tables:
         """Over alpha, for one route."""
         import numpy as np
 
-        from bench.inversion.lcurve import l_curve
+        from bench.inversion.lcurve import l_curve, minima
         from bench.inversion.tradeoff import trade_off
         from bench.views import lcurve as view
 
@@ -81,15 +111,13 @@ class Run:
                 f"--alpha-sweep {given[0]:.10g} {given[1]:.10g}: are the same to six digits - go further apart"
             )
         if draws is not None:
-            trades = trade_off(self.spec, route, self.engine, alphas, draws, self.at)
-            if not self.quiet and trades:
+            trades = self._until_it_ends(trade_off(self.spec, route, self.engine, alphas, draws, self.at))
+            if not self.quiet:
                 if self.plots:
                     self.out.print(view.trade_plot(trades, min(self.out.width, 100)))
                 self.out.print(view.trades(trades))
-            self.interrupted = len(trades) < len(alphas)
             return {"tradeoff": [trade.row for trade in trades]}
-        points = l_curve(self.spec, route, self.engine, alphas, self.at, watch=self._swept)
-        self.interrupted = any(point.inversion.interrupted for point in points)
+        points = l_curve(self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at))))
         best = next((point for point in points if point.chosen), points[-1]).inversion
         self._warn(best)
         if not self.quiet:
@@ -140,12 +168,15 @@ class Run:
 
         self._say(lambda: view.line(self.out, step))
 
-    def _swept(self, found: Inversion) -> None:
-        last = found.iterates[-1]
-        paid = f"{last.iteration} iterations, {last.seconds:.3g} s"
-        said = f"alpha = {found.alpha:.3g}: misfit {last.misfit:.4g} after {paid}"
-        if self.out.is_terminal:
-            self._say(lambda: self.out.print(said, style="dim"))
+    def _swept(self, every: Iterable[Inversion]) -> Iterator[Inversion]:
+        for found in every:
+            self.interrupted = found.interrupted
+            yield found
+            last = found.iterates[-1]
+            paid = f"{last.iteration} iterations, {last.seconds:.3g} s"
+            said = f"alpha = {found.alpha:.3g}: misfit {last.misfit:.4g} after {paid}"
+            if self.out.is_terminal:
+                self._say(lambda said=said: self.out.print(said, style="dim"))
 
     def _say(self, show: Any) -> None:
         if not self.quiet:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 FAILED, INTERRUPTED = 1, 130
 FINISHED = "what is finished is printed, and kept unless --no-store"
-GRACE = 10.0  # [s] between an interrupt and the end of what does not react to it
+GRACE = 5.0  # [s] between an interrupt and the end of what does not react to it
+KEEPING = 10.0  # [s] to keep what there is when the time is over
 STOPS = "Seconds of wall time, after which {} is stopped, and 10 s later killed with all it started; inf: none."
 ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
 KILLS = "Seconds of wall time, after which {} is killed with all it started; inf: none."
@@ -37,6 +38,7 @@ AFFINITY = "Processors to stay on: 0 or 0,2-3. [any]"
 class Inside:
     """The context's object in a process that is confined already."""
 
+    stopped: bool = False  # it has been told to end
     expired: bool = False  # its time is over, and it is being stopped: the process that watches it says so
 
 
@@ -118,7 +120,7 @@ def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
     reader, writer = os.pipe()
     arguments = [given, str(os.getpid()), str(writer), *sys.argv[1:]]
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # what was started ends, too
-    last = (EXPIRED, GRACE) if keeps else None
+    last = (EXPIRED, KEEPING) if keeps else None
     process = Confined("bench.isolation.command", arguments, limits, talkative=True, last_words=last, pass_fds=[writer])
     os.close(writer)
     try:
@@ -159,11 +161,9 @@ def _ended(verb: str, status: str, reason: str, todo: str, process: Confined, ke
 
 def _interrupted(process: Confined) -> int:
     """The verb may still print and keep what it has."""
-    from bench.isolation.process import Killed
-
     process.process.send_signal(signal.SIGINT)
-    with suppress(Killed, KeyboardInterrupt):  # its time is over, or the user's patience
-        process.watch(process.ended, time.monotonic() + GRACE)
+    with suppress(KeyboardInterrupt):  # the user's patience is over
+        process.ended(GRACE)
     process.kill()
     if "routes: interrupted" not in process.stderr:
         complain("interrupted - nothing is kept")

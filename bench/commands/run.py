@@ -102,6 +102,7 @@ def run(
     130 interrupted.
     """
     from bench import case
+    from bench.executors.interrupt import Interrupt
     from bench.files import Files
     from bench.partial import chosen
     from bench.runner import run as run_cases
@@ -130,7 +131,9 @@ def run(
     try:
         with closing(outcomes):  # whatever interrupts, cases under way are ended first
             for outcome in with_progress(outcomes, count):
-                done.take(outcome)
+                with Interrupt() as interrupt:  # a row that is finished is kept whole
+                    done.take(outcome)
+                interrupt.heard()
     except KeyboardInterrupt:
         raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
     finally:  # an interrupt leaves what was measured on the screen, too

@@ -16,7 +16,7 @@ class Interrupt:
     wake() is called when it comes: by the handler of a signal, so that it must not wait for a lock.
     """
 
-    def __init__(self, wake: Callable[[], None]) -> None:
+    def __init__(self, wake: Callable[[], None] = lambda: None) -> None:
         self._wake, self._noted = wake, False
         self._held: list[signal.Signals] = []
 

@@ -77,6 +77,8 @@ class Line:
 
     def _came(self, seconds: float) -> bool:
         """Whether a message has, within so many seconds."""
+        if self.process.gone:
+            self._hang_up()  # a child it has left behind may hold the line open: who listens gets what is on it yet
         try:
             self._message = self._heard.get(timeout=seconds)
         except Empty:
@@ -93,10 +95,14 @@ class Line:
         or it would read on from the next that gets it.
         """
         self.process.kill()
-        with suppress(OSError), socket.fromfd(self.connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as line:
-            line.shutdown(socket.SHUT_RDWR)  # a daemon may hold the other end open
+        self._hang_up()
         self._listening.join()
         self.connection.close()
+
+    def _hang_up(self) -> None:
+        """Nothing more will come, whoever holds the other end."""
+        with suppress(OSError), socket.fromfd(self.connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as line:
+            line.shutdown(socket.SHUT_RDWR)
 
 
 class Isolated:

@@ -6,10 +6,13 @@ from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
 
+from bench.executors.interrupt import Interrupt
 from bench.executors.isolated import Isolated, finished
 from bench.isolation.limits import Limits
 from bench.outcome import Outcome
 from bench.worker import Measure
+
+TICK = 0.1  # [s] between two looks whether it is interrupted
 
 
 def outcomes(jobs: Iterator[Measure], slots: int, limits: Limits) -> Iterator[Outcome]:
@@ -17,16 +20,19 @@ def outcomes(jobs: Iterator[Measure], slots: int, limits: Limits) -> Iterator[Ou
     running: dict[Future[Outcome], Isolated] = {}
     with ThreadPoolExecutor(slots) as threads:
         try:
-            while True:
-                for job in islice(jobs, slots - len(running)):
-                    case = Isolated(job, limits)
-                    running[threads.submit(finished, case)] = case
-                if not running:
-                    return
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    del running[future]
-                yield from (future.result() for future in done)
+            with Interrupt() as interrupt:  # raised at once it might lose outcomes that have come
+                while True:
+                    for job in islice(jobs, slots - len(running)):
+                        case = Isolated(job, limits)
+                        running[threads.submit(finished, case)] = case
+                    if not running:
+                        return
+                    done, _ = wait(running, TICK, FIRST_COMPLETED)
+                    for future in done:
+                        del running[future]
+                    yield from (future.result() for future in done)
+                    interrupt.heard()
         finally:
-            for case in running.values():
-                case.close()
+            with Interrupt():  # impatience would leave processes that the threads wait for
+                for case in running.values():
+                    case.close()

@@ -65,8 +65,8 @@ class History:
             self.distance(found.p),
             says,
         )
-        self.iterates.append(iterate)
         self.last = found
+        self.iterates.append(iterate)
         self.watch(iterate)
 
     def distance(self, p: Array) -> float | None:

@@ -139,6 +139,10 @@ def invert(
             end, interrupted = "interrupted", True
     last = history.last
     assert last is not None
+    try:
+        shown = view(problem, last, engine.solver, looked_for=not interrupted)
+    except KeyboardInterrupt:  # what was found is not lost with what would be shown beside it
+        shown, interrupted = ParameterView(), True
     return Inversion(
         spec.name,
         spec.options,
@@ -156,7 +160,7 @@ def invert(
         last.p,
         last.gradient,
         truth,
-        view(problem, last, engine.solver, looked_for=not interrupted),
+        shown,
         end,
         interrupted,
         variables.warning(data(problem, last.p)),

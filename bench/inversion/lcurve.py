@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from bench.inversion.diagnosis import AT_MINIMUM
 from bench.inversion.invert import Engine, Inversion, invert
 from bench.rows import Row
 from problems.errors import InputError
-from problems.problem import Array, Problem
+from problems.problem import Array
 
 BENT = 3  # points that a curvature takes
 
@@ -42,30 +42,27 @@ class Point:
         return self.inversion.shared | own | counts | {"ended": self.inversion.end}
 
 
-def l_curve(
-    spec: ProblemSpec,
-    route: RouteSpec,
-    engine: Engine,
-    alphas: Sequence[float],
-    at: str = "start",
-    problem: Problem | None = None,
-    watch: Callable[[Inversion], None] = lambda inversion: None,
-) -> list[Point]:
-    """J minimized at every alpha, the largest first, each from the minimum before; corner and discrepancy marked.
+def minima(
+    spec: ProblemSpec, route: RouteSpec, engine: Engine, alphas: Sequence[float], at: str = "start"
+) -> Iterator[Inversion]:
+    """J minimized at every alpha, the largest first, each from the minimum before, until one is interrupted.
 
     Raises InputError for a problem without Phi.
     """
-    made = problem or spec()
+    made = spec()
     if made.regularization is None:
         raise InputError(f"invert: {made.name} has no Phi(p) to weigh - choose a problem with alpha=")
-    found: list[Inversion] = []
     p: Array | None = None
     for alpha in sorted(map(float, alphas), reverse=True):
-        found.append(invert(spec, route, engine, at, p, made=made.weighted(alpha)))
-        p = found[-1].p
-        watch(found[-1])
-        if found[-1].interrupted:
-            break
+        found = invert(spec, route, engine, at, p, made=made.weighted(alpha))
+        yield found
+        if found.interrupted:
+            return
+        p = found.p
+
+
+def l_curve(found: Sequence[Inversion]) -> list[Point]:
+    """The minima, corner and discrepancy marked."""
     return chosen([_point(each) for each in found])
 
 

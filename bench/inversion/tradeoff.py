@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,22 +33,23 @@ class Trade:
 
 def trade_off(
     spec: ProblemSpec, route: RouteSpec, engine: Engine, alphas: Sequence[float], draws: int, at: str = "start"
-) -> list[Trade]:
-    """J minimized for every draw of the noise at every alpha, the largest first. Raises InputError."""
+) -> Iterator[Trade]:
+    """J minimized for every draw of the noise at every alpha, the largest first.
+
+    Raises InputError, and KeyboardInterrupt where a draw was interrupted: the others at that alpha are no trade.
+    """
     if not spec.options.get("noise"):
         raise InputError(f"invert: --draws {draws} of a problem without noise - write {spec.name}[noise=...]")
     problems = drawn(spec, draws)
     starts: list[Array | None] = [None] * draws
-    trades: list[Trade] = []
     for alpha in sorted(map(float, alphas), reverse=True):
         found = []
         for k, problem in enumerate(problems):
             found.append(invert(spec, route, engine, at, starts[k], made=problem.weighted(alpha)))
             starts[k] = found[-1].p
             if found[-1].interrupted:
-                return trades
-        trades.append(_trade(found))
-    return trades
+                raise KeyboardInterrupt
+        yield _trade(found)
 
 
 def _trade(found: Sequence[Inversion]) -> Trade:

@@ -31,11 +31,14 @@ def main() -> None:
 
     inside = Inside()
 
-    def expire(number: int, frame: FrameType | None) -> None:
-        inside.expired = True
-        raise KeyboardInterrupt
+    def stop(number: int, frame: FrameType | None) -> None:
+        """Once: a group may be told as a whole, and its parent pass it on, while this keeps what it has."""
+        if not inside.stopped:
+            inside.stopped, inside.expired = True, number == EXPIRED
+            raise KeyboardInterrupt
 
-    signal.signal(EXPIRED, expire)
+    for number in (signal.SIGINT, signal.SIGTERM, EXPIRED):
+        signal.signal(number, stop)
     try:
         routes(arguments, prog_name="routes", obj=inside)
     except SystemExit:  # how click ends

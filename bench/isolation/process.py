@@ -66,6 +66,7 @@ class Confined:
     ) -> None:
         self.limits = limits
         self._oom_kills = _oom_kills()
+        self._killing, self._killed = threading.RLock(), False
         self._talkative, self._stderr, self._last_words = talkative, bytearray(), last_words
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", module, *arguments],
@@ -107,18 +108,27 @@ class Confined:
             return False
         return True
 
+    @property
+    def gone(self) -> bool:
+        """Whether it has ended, by now or long ago."""
+        return self.process.poll() is not None
+
     def kill(self) -> None:
-        """SIGKILL to the whole group, and to what left it."""
-        strays = self._descendants()
-        with suppress(OSError):
-            if os.name == "posix":
-                os.killpg(self.process.pid, signal.SIGKILL)
-            else:
-                self.process.kill()
-        for stray in strays:
-            with suppress(psutil.Error):
-                stray.kill()
-        self.process.wait()
+        """SIGKILL to the whole group, and to what left it; once, for its number may be another's afterwards."""
+        with self._killing:
+            if self._killed:
+                return
+            strays = self._descendants()
+            with suppress(OSError):
+                if os.name == "posix":
+                    os.killpg(self.process.pid, signal.SIGKILL)
+                else:
+                    self.process.kill()
+            for stray in strays:
+                with suppress(psutil.Error):
+                    stray.kill()
+            self.process.wait()
+            self._killed = True
         self._pump.join(1.0)
 
     def ending(self) -> Ending:

@@ -56,6 +56,7 @@ class Climb:
     def __init__(self, sizes: Sizes, routes: Sequence[RouteSpec], settings: Settings, measure: Measure) -> None:
         self.sizes, self.settings, self.measure = sizes, settings, measure
         self.series = [Series(route) for route in routes]
+        self.at: ProblemSpec | None = None  # while it climbs
 
     @property
     def live(self) -> list[Series]:
@@ -64,6 +65,7 @@ class Climb:
     def run(self) -> Iterator[Outcome]:
         """Size by size, the routes that are left. Raises InputError, DomainError for the first size."""
         for spec in self.sizes.specs:
+            self.at = spec
             self._prune(spec)
             waiting = self.live
             if not waiting:
@@ -74,15 +76,18 @@ class Climb:
                     waiting.remove(series)
                     series.take(spec, outcome.row)
                     yield outcome
-            except KeyboardInterrupt:
-                for series in self.live:
-                    series.stop("interrupted", f"at {self.sizes.label(spec)}")
-                raise
             except RoutesError as failure:  # a problem that cannot be had so large
                 if not any(series.cases for series in self.series):
                     raise
                 for series in self.live:
                     series.stop("not built", str(failure))
+        self.at = None
+
+    def interrupt(self) -> None:
+        """It has been cut short, if it was not through."""
+        if self.at is not None:
+            for series in self.live:
+                series.stop("interrupted", f"at {self.sizes.label(self.at)}")
 
     def _prune(self, spec: ProblemSpec) -> None:
         """Not tried: what grows as it did between the last two sizes is over the budget here."""

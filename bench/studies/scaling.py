@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 
 from bench.case import ProblemSpec, RouteSpec
+from bench.executors.interrupt import Interrupt
 from bench.outcome import Outcome
 from bench.rows import Row
 from bench.runner import run
@@ -84,12 +85,15 @@ def scaling(
     reason, interrupted = None, False
     try:
         for outcome in climb.run():
-            rows.append(outcome.row)
-            taken(outcome)
+            with Interrupt() as interrupt:  # a row that is finished is kept whole
+                rows.append(outcome.row)
+                taken(outcome)
+            interrupt.heard()
         races, reason = race(sizes, climb.series, settings)
     except KeyboardInterrupt:
         if not rows:
             raise
+        climb.interrupt()
         interrupted = True
     growths = tuple(growths_of(sizes, climb.series, settings.at))
     return Scaling(sizes, tuple(rows), tuple(climb.series), growths, tuple(races), reason, interrupted)

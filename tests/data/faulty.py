@@ -145,6 +145,13 @@ def abandon() -> None:
         time.sleep(987)
 
 
+def orphan() -> None:
+    """Dies with all that is open in the hands of a child."""
+    if os.fork() == 0:
+        time.sleep(987)
+    os.abort()
+
+
 def daemonize() -> None:
     """The child of a child that has ended, in a session of its own: nobody's any more."""
     if os.fork() == 0:
@@ -273,7 +280,20 @@ def by_pardiso() -> None:
 
 
 NAMED = (
-    *(sleep, hang, stubborn, escape, abandon, daemonize, take, take_by_jax, take_in_c, take_by_child, factorize),
+    *(
+        sleep,
+        hang,
+        stubborn,
+        escape,
+        abandon,
+        orphan,
+        daemonize,
+        take,
+        take_by_jax,
+        take_in_c,
+        take_by_child,
+        factorize,
+    ),
     *(garbage, flood, close, hang_up, scribble, fingers, by_blas, by_xla, by_pardiso),
 )
 MISDEEDS: dict[str, Callable[[], object]] = {
