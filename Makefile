@@ -60,7 +60,7 @@ benchmark-regression: $(READY) ## kernels and routes timed against tests/benchma
 benchmark-baseline: $(READY) ## tests/benchmarks/baseline.json anew: look at its diff
 	$(BIN)/python tests/benchmarks/gate.py --write
 
-benchmark: $(READY) ## the default matrix into results/, with resume, then scaling, limits, verdicts (an hour)
+benchmark: $(READY) ## the default matrix into results/, with resume, then scaling, limits, verdicts (half an hour)
 	$(BIN)/routes run $(DEFAULT) --route all --resume
 	$(BIN)/routes scaling --problem bar --no-plot
 	$(BIN)/routes scaling --problem block --route tangent --route adjoint --route fd-central --growth 2 --no-plot
