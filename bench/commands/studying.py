@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from bench.plain import unread
 from problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -45,9 +47,12 @@ def echo_json(tables: Mapping[str, Sequence[Row]]) -> None:
     """One object a line, its table among its values."""
     from bench.rows import as_json
 
-    for name, rows in tables.items():
-        for row in rows:
-            click.echo(as_json({"table": name, **row}))
+    try:
+        for name, rows in tables.items():
+            for row in rows:
+                click.echo(as_json({"table": name, **row}))
+    except BrokenPipeError:
+        unread(sys.stdout)
 
 
 def keep(kept: Path | None, tables: Mapping[str, Sequence[Row]], started: str, quiet: bool) -> None:
