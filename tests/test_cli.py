@@ -291,8 +291,9 @@ def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(tmp_pat
 @pytest.mark.parametrize(("verb", "table"), [("invert", "inversion"), ("tolerance --route adjoint", "tolerance")])
 @pytest.mark.parametrize("form", ["", "--json"])
 def test_a_study_whose_reader_leaves_is_kept(verb: str, table: str, form: str, tmp_path: Path) -> None:
-    cut = shell(f"routes {verb} --problem bar {form} | head -1", tmp_path)
-    assert (cut.stdout.count("\n"), cut.stderr) == (1, "")
+    """`true` has gone before anything is printed."""
+    cut = shell(f"routes {verb} --problem bar {form} | true", tmp_path)
+    assert (cut.stdout, cut.stderr) == ("", "")
     assert len(Store(tmp_path / "results" / "routes.sqlite").records(table)) > 2
 
 

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 FAILED, INTERRUPTED = 1, 130
 FINISHED = "what is finished is printed, and kept unless --no-store"
 GRACE = 5.0  # [s] between an interrupt and the end of what does not react to it
-KEEPING = 10.0  # [s] to keep what there is when the time is over
-STOPS = "Seconds of wall time, after which {} is stopped, and 10 s later killed with all it started; inf: none."
+LAST = 10.0  # [s] to keep what there is when the time is over
+STOPS = (
+    f"Seconds of wall time, after which {{}} is stopped, and {LAST:g} s later killed with all it started; inf: none."
+)
 ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
 KILLS = "Seconds of wall time, after which {} is killed with all it started; inf: none."
 MEMORY = "Resident memory at which it is killed: 4GiB, 500MB. [what the machine has]"
@@ -120,7 +122,7 @@ def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
     reader, writer = os.pipe()
     arguments = [given, str(os.getpid()), str(writer), *sys.argv[1:]]
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # what was started ends, too
-    last = (EXPIRED, KEEPING) if keeps else None
+    last = (EXPIRED, LAST) if keeps else None
     process = Confined("bench.isolation.command", arguments, limits, talkative=True, last_words=last, pass_fds=[writer])
     os.close(writer)
     try:
