@@ -58,12 +58,9 @@ ENDLESS = {
 }
 
 
-@pytest.mark.parametrize("verb", ENDLESS)
-def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
-    verb: str, cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """The limit is met once there are some gradients, however long that takes."""
-    (tmp_path / "counted.py").write_text(COUNTED)
+@pytest.fixture
+def late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A limit that is met once there are some gradients, however long that takes."""
     file = tmp_path / "gradients"
 
     class Late:
@@ -73,6 +70,13 @@ def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
 
     for module in (limited, watching):
         monkeypatch.setattr(module, "time", Late)
+
+
+@pytest.mark.parametrize("verb", ENDLESS)
+def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
+    verb: str, late: None, cli, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "counted.py").write_text(COUNTED)
     ran = cli(verb, "--problem", "counted.py:Counted", "--json", "--isolate", *ENDLESS[verb])
     told = f"{verb}: timeout: after 3600 s of --timeout - raise the limit, or ask for less; {FINISHED}"
     assert (ran.code, ran.err) == (1, f"routes: {told}\n")
@@ -122,6 +126,29 @@ def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, 
     assert (ran.code, ran.out, ran.err) == (130, "", "routes: interrupted - nothing is kept\n")
     started.nothing_is_left()
     assert not (started.folder / "results" / "routes.sqlite").exists()
+
+
+DEAF = """
+import os, signal, time
+
+class Deaf(Counted):
+    def linearize(self, u, p):
+        if os.path.exists("gradients") and os.path.getsize("gradients") > 9:
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+            time.sleep(987)
+        return super().linearize(u, p)
+"""
+
+
+def test_a_verb_that_does_not_react_is_killed_and_says_nothing_of_what_it_has(
+    late: None, cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "deaf.py").write_text(COUNTED + DEAF)
+    monkeypatch.setattr(limited, "LAST", 0.5)
+    ran = cli("invert", "--problem", "deaf.py:Deaf", "--isolate", "--no-plot", *ENDLESS["invert"])
+    told = "invert: timeout: after 3600 s of --timeout - raise the limit, or ask for less"
+    assert (ran.code, ran.err) == (1, f"routes: {told}\n")
+    assert not Store(tmp_path / "results" / "routes.sqlite").records("inversion")
 
 
 def test_a_group_that_is_told_to_end_keeps_what_it_has(started: Shell) -> None:

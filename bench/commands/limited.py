@@ -128,7 +128,7 @@ def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
     try:
         process.watch(process.ended, time.monotonic() + limits.timeout)
     except Killed as limit:
-        left = f"; {FINISHED}" if keeps and limit.status == "timeout" else ""
+        left = f"; {FINISHED}" if keeps and process.process.returncode == INTERRUPTED else ""  # else it did not react
         return _ended(verb, limit.status, limit.reason, f"raise the limit, or ask for less{left}", process, kept)
     except KeyboardInterrupt:
         return _interrupted(process)
