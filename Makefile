@@ -65,20 +65,20 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/routes scaling --problem bar --no-plot
 	$(BIN)/routes scaling --problem block --route tangent --route adjoint --route fd-central --growth 2 --no-plot
 	$(BIN)/routes scaling --problem advection --route tangent --route adjoint --no-plot
-	$(BIN)/python -m bench.studies.limits
-	$(BIN)/python -m bench.studies.block_limits
-	$(BIN)/python -m bench.studies.verdicts
-	$(BIN)/python -m bench.studies.confusion
-	$(BIN)/python -m bench.studies.harness
-	$(BIN)/python -m bench.studies.repeat
-	$(BIN)/python -m bench.studies.reporting
-	$(BIN)/python -m bench.studies.killing
+	$(BIN)/python -m benchmarks.bar_limits
+	$(BIN)/python -m benchmarks.block_limits
+	$(BIN)/python -m benchmarks.verdicts
+	$(BIN)/python -m benchmarks.confusion
+	$(BIN)/python -m benchmarks.harness
+	$(BIN)/python -m benchmarks.repeat
+	$(BIN)/python -m benchmarks.reporting
+	$(BIN)/python -m benchmarks.killing
 
 reports: $(READY) ## everything in results/ as one page, results/report.html; of the reference run where there is no other
 	$(BIN)/routes report --store $(REPORTED) -o results/report.html
 
 reference: $(READY) ## the small reference run that is committed, and its report, anew
-	$(BIN)/python -m bench.studies.reference
+	$(BIN)/python -m benchmarks.reference_run
 
 clean: ## remove what was installed, built and cached; keep results/
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks

@@ -11,21 +11,21 @@ from typing import Any, NoReturn
 
 import click
 
-from bench.commands.check import check
-from bench.commands.compare import baseline, compare
-from bench.commands.identify import identify
-from bench.commands.invert import invert
-from bench.commands.kink import kink
-from bench.commands.limited import FINISHED, Inside
-from bench.commands.report import report
-from bench.commands.run import run
-from bench.commands.scaling import scaling
-from bench.commands.shared import complain, debug_option, debugging, store_option
-from bench.commands.status import status
-from bench.commands.tolerance import tolerance
-from bench.commands.unrolling import unrolling
-from bench.commands.vcurve import vcurve
-from problems.errors import DomainError, InputError, RoutesError
+from gradient_routes.bench.command_options import complain, debug_option, debugging, store_option
+from gradient_routes.bench.commands.compare import baseline, compare
+from gradient_routes.bench.commands.report import report
+from gradient_routes.bench.commands.status import status
+from gradient_routes.bench.execution.limited import FINISHED, Inside
+from gradient_routes.bench.studies.bill.command import run
+from gradient_routes.bench.studies.check.command import check
+from gradient_routes.bench.studies.identify.command import identify
+from gradient_routes.bench.studies.invert.command import invert
+from gradient_routes.bench.studies.kink.command import kink
+from gradient_routes.bench.studies.scaling.command import scaling
+from gradient_routes.bench.studies.tolerance.command import tolerance
+from gradient_routes.bench.studies.unrolling.command import unrolling
+from gradient_routes.bench.studies.vcurve.command import vcurve
+from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 READING = ("compare", "baseline", "status", "report", "export")  # verbs that fail by what they are given only
@@ -64,7 +64,7 @@ class Routes(click.Group):
             complain(f"{error.strerror or error} - check where the output goes")
             ctx.exit(WRONG_USAGE)
         except (Exception, SystemExit) as failure:  # what code of others may leave by
-            from bench.outcome import one_line, status_of
+            from gradient_routes.bench.cases.outcome import one_line, status_of
 
             if debugging():
                 traceback.print_exc()
@@ -120,8 +120,8 @@ main.add_command(kink)
 @debug_option
 def list_(what: str | None) -> None:
     """What exists: problems, routes, their options with defaults, plug-ins that cannot be imported."""
-    from bench.views.listing import listing
-    from bench.views.tables import console
+    from gradient_routes.bench.commands.listing import listing
+    from gradient_routes.bench.render.terminal.tables import console
 
     out = console()
     if what != "routes":
@@ -138,8 +138,8 @@ def list_(what: str | None) -> None:
 @debug_option
 def export(table: str, format: str | None, output: Path | None, store: Path) -> None:
     """Tables of the store as CSV, Parquet or JSON (one array of row objects)."""
-    from bench.export import export as write
-    from bench.store import Store
+    from gradient_routes.bench.store.export import export as write
+    from gradient_routes.bench.store.store import Store
 
     named = output.suffix.lstrip(".") if output is not None else ""
     write(Store(store), table, format or (named if named in ("parquet", "json") else "csv"), output)

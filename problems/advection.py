@@ -12,13 +12,23 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.errors import InputError, check_applies
-from problems.inherited import inherited
-from problems.observation import Candidates, Observation, selection
-from problems.problem import Array, Fields, Linearization, Offers, Operator, Parameters, ParameterView, Problem, Traced
-from problems.regularization import WIDTH as JUMP
-from problems.regularization import FieldPhi, Prior
-from problems.supg import Supg, direction, inflow
+from gradient_routes.problems.data.observation import Candidates, Observation, selection
+from gradient_routes.problems.data.regularization import WIDTH as JUMP
+from gradient_routes.problems.data.regularization import FieldPhi, Prior
+from gradient_routes.problems.errors import InputError, check_applies
+from gradient_routes.problems.fem.prolongation import inherited
+from gradient_routes.problems.fem.supg import Supg, direction, inflow
+from gradient_routes.problems.problem import (
+    Array,
+    Fields,
+    Linearization,
+    Offers,
+    Operator,
+    Parameters,
+    ParameterView,
+    Problem,
+    Traced,
+)
 
 TARGET = 0.5  # temperature wanted where the flow is observed [K]
 N_MAX = 3000  # 10^7 cells: more fit in no memory
@@ -49,7 +59,7 @@ class Advection(Problem):
     State u (n_u,) [K], temperatures of the nodes the flow does not enter by; one kappa or one f a cell, (n_e,).
     J = 1/2 w sum of (u_i - d_i)^2 over the nodes seen, w = h where they are the outflow and h^2 where they are all,
     so that J stands for an integral. Without synthetic data, d = 0.5 K. What is not sought is known: f is a plume, or
-    kappa is the same everywhere. SUPG (problems/supg.py) keeps u smooth where cells are too wide for their kappa.
+    kappa is the same everywhere. SUPG (problems/fem/supg.py) keeps u smooth where cells are too wide for their kappa.
     """
 
     name = "advection"
@@ -175,7 +185,7 @@ class Advection(Problem):
         return self.regularization, self._theta(p), np.ones_like(p) if self.log or self.of_source else 1.0 / p
 
     def traced(self) -> Traced:
-        from problems.jax64 import jnp
+        from gradient_routes.problems.jax64 import jnp
 
         return Traced(residual=lambda u, p: self.residual(u, p, jnp), objective=lambda u, p: self.objective(u, p, jnp))
 
@@ -204,7 +214,8 @@ class Advection(Problem):
     def _data(self) -> Array:
         if self.d is None:
             raise InputError(
-                "advection: data=twin are not made yet - solve for them: routes.twin.with_synthetic_data(advection)"
+                "advection: data=twin are not made yet - solve for them:"
+                " gradient_routes.routes.synthetic_data.with_synthetic_data(advection)"
             )
         return self.d
 

@@ -2,7 +2,7 @@
 
 K(E) u = f,    k_e = E_e A / L_e [[1, -1], [-1, 1]],    f = F at node N,    K = B^T diag(E A / L_e) B
 
-Beyond the tip there may be a stop (problems/stop.py): its force makes the problem nonlinear, and not smooth.
+Beyond the tip there may be a stop (problems/contact.py): its force makes the problem nonlinear, and not smooth.
 """
 
 from __future__ import annotations
@@ -14,14 +14,30 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.chain import Bordered, Chain, ElementForces, cumulative_sum, difference, divergence
-from problems.errors import InputError, check_applies
-from problems.observation import Candidates, Observation, selection
-from problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Reference, Traced
-from problems.regularization import WIDTH as JUMP
-from problems.regularization import FieldPhi, Prior
-from problems.sensors import Nodes, Sensors, measured, parse_nodes
-from problems.stop import GAP, K_C, WIDTH, Stop, StopName, stop_of
+from gradient_routes.problems.contact import GAP, K_C, WIDTH, Stop, StopName, stop_of
+from gradient_routes.problems.data.observation import Candidates, Observation, selection
+from gradient_routes.problems.data.regularization import WIDTH as JUMP
+from gradient_routes.problems.data.regularization import FieldPhi, Prior
+from gradient_routes.problems.data.sensors import Nodes, Sensors, measured, parse_nodes
+from gradient_routes.problems.errors import InputError, check_applies
+from gradient_routes.problems.matrices.tridiagonal import (
+    Bordered,
+    Chain,
+    ElementForces,
+    cumulative_sum,
+    difference,
+    divergence,
+)
+from gradient_routes.problems.problem import (
+    Array,
+    Linearization,
+    Offers,
+    Parameters,
+    ParameterView,
+    Problem,
+    Reference,
+    Traced,
+)
 
 L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
 THETA_MAX = 170.0  # E = exp(theta) < 1e74: the squares and cubes of E in J and dJ/dE stay in float64's range
@@ -221,7 +237,7 @@ class Bar(Problem):
         return self.regularization, self.log_modulus(p), np.ones_like(p) if self.log else 1.0 / p
 
     def traced(self) -> Traced:
-        from problems.jax64 import jnp
+        from gradient_routes.problems.jax64 import jnp
 
         physics = Traced(lambda u, p: self.residual(u, p, jnp), lambda u, p: self.objective(u, p, jnp))
         if not self.linear:

@@ -10,19 +10,30 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems import bodies, probes, unknowns
-from problems.block_options import check, lengths
-from problems.displacement_data import DisplacementData
-from problems.elements import ElementName
-from problems.errors import InputError
-from problems.inherited import inherited
-from problems.mechanics import Load, Mechanics
-from problems.observation import Candidates, Observation
-from problems.problem import Array, Fields, Linearization, Offers, Operator, ParameterView, Problem, Traced
-from problems.regularization import WIDTH as JUMP
-from problems.regularization import Phi, Prior
-from problems.supports import Supports, check_clamp
-from problems.unknowns import FIELDS, MATERIAL, Setting, Unknown, UnknownName
+from gradient_routes.problems.data import probes
+from gradient_routes.problems.data.displacement_data import DisplacementData
+from gradient_routes.problems.data.observation import Candidates, Observation
+from gradient_routes.problems.data.regularization import WIDTH as JUMP
+from gradient_routes.problems.data.regularization import Phi, Prior
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.fem import mesh as bodies
+from gradient_routes.problems.fem.boundary_conditions import Supports, check_clamp
+from gradient_routes.problems.fem.elements import ElementName
+from gradient_routes.problems.fem.prolongation import inherited
+from gradient_routes.problems.mechanics import design_variables as unknowns
+from gradient_routes.problems.mechanics.block_options import check, lengths
+from gradient_routes.problems.mechanics.design_variables import FIELDS, MATERIAL, Setting, Unknown, UnknownName
+from gradient_routes.problems.mechanics.loaded_solid import Load, Mechanics
+from gradient_routes.problems.problem import (
+    Array,
+    Fields,
+    Linearization,
+    Offers,
+    Operator,
+    ParameterView,
+    Problem,
+    Traced,
+)
 
 LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
 DIRECTIONS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # of load case 1, 2, 3
@@ -79,7 +90,7 @@ class Block(Problem):
     ) -> None:
         self._given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         check(SimpleNamespace(**self._given))
-        from problems.materials import LAWS
+        from gradient_routes.problems.mechanics.materials import LAWS
 
         chosen, by_hand = LAWS[law], derivatives == "hand"
         if by_hand and chosen.hand is None:
@@ -203,7 +214,7 @@ class Block(Problem):
         return Linearization(self.mechanics.by_p(u, p), J_u, J_p)
 
     def traced(self) -> Traced:
-        from problems.jax64 import jnp
+        from gradient_routes.problems.jax64 import jnp
 
         return Traced(residual=self.mechanics.traced_residual, objective=lambda u, p: self.objective(u, p, jnp))
 

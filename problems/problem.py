@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.errors import DomainError, InputError, NotOffered
+from gradient_routes.problems.errors import DomainError, InputError, NotOffered
 
 if TYPE_CHECKING:
-    from problems.observation import Candidates, Observation
-    from problems.regularization import Prior
+    from gradient_routes.problems.data.observation import Candidates, Observation
+    from gradient_routes.problems.data.regularization import Prior
 
 Array = NDArray[Any]
 Structure = Literal["spd", "symmetric", "general"]

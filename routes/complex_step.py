@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from problems.problem import Array
-from routes.model import Model
-from routes.route import ForwardWork, Offers, Result, Work, route
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, route
 
 RELATIVE_STEP = 1e-30  # its square is far below eps, itself far above the smallest float
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from problems.jax64 import jax, jnp
-from routes.model import Model
-from routes.newton import State
-from routes.refinement import LinearizedSolver
+from gradient_routes.problems.jax64 import jax, jnp
+from gradient_routes.routes.linearized_solve import LinearizedSolver
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State
 
 
 class Solved:

@@ -7,13 +7,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.errors import InputError, NotOffered
-from problems.problem import Array, Linearization, Problem
-from routes.forward_work import ForwardWork
-from routes.model import Model
-from routes.newton import State
-from routes.refinement import LinearizedSolver, work
-from routes.route import Offers, Result, Work, route
+from gradient_routes.problems.errors import InputError, NotOffered
+from gradient_routes.problems.problem import Array, Linearization, Problem
+from gradient_routes.routes.forward_work import ForwardWork
+from gradient_routes.routes.linearized_solve import LinearizedSolver, work
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State
+from gradient_routes.routes.route import Offers, Result, Work, route
 
 Fault = Annotated[
     Literal["sign", "factor", "transpose", "missing-term", "stale", "loose", "functional", "otd", "scale"],

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.errors import DomainError, InputError
-from problems.problem import Array, Offers, Parameters, Problem
-from routes.model import Model
-from routes.route import ForwardWork, Result, Work, route
+from gradient_routes.problems.errors import DomainError, InputError
+from gradient_routes.problems.problem import Array, Offers, Parameters, Problem
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import ForwardWork, Result, Work, route
 
 Start = Annotated[
     Literal["cold", "warm", "chord"],

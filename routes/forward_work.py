@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from routes.newton import Solver
-from routes.tally import Work
+from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.tally import Work
 
 
 @dataclass(frozen=True)

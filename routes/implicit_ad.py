@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from problems.problem import Array
-from routes.model import Model
-from routes.refinement import Factors, work
-from routes.route import ForwardWork, Gradient, Offers, Result, Work, route
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.linearized_solve import Factors, work
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import ForwardWork, Gradient, Offers, Result, Work, route
 
 if TYPE_CHECKING:
-    from routes.differentiable import Solved
+    from gradient_routes.routes.differentiable import Solved
 
 
 def cost(n_p: int, forward: ForwardWork, *, factors: str) -> Work:
@@ -22,8 +22,8 @@ def cost(n_p: int, forward: ForwardWork, *, factors: str) -> Work:
 @route("implicit-ad", needs=Offers.SOLVE | Offers.TRACE, cost=cost, staged=True)
 def implicit_ad(model: Model, p: Array, *, factors: Factors = "refined") -> Gradient:
     """dJ/dp = vjp of p -> J(u(p), p), the pullback of u(p) being one adjoint solve (jax.custom_vjp)."""
-    from problems.jax64 import jax
-    from routes.differentiable import differentiable_solve, held_bytes
+    from gradient_routes.problems.jax64 import jax
+    from gradient_routes.routes.differentiable import differentiable_solve, held_bytes
 
     solved: list[Solved] = []
     solve = differentiable_solve(model, factors, solved.append)

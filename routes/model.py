@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from problems.errors import NotConverged, SingularMatrix
-from problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
-from routes.continuation import by_load_steps
-from routes.directions import Chord, Direction, Doorways, Full, Inexact
-from routes.factorization import Factorization, Factorizer
-from routes.newton import Solver, State, Step, newton, norm
-from routes.tally import Tally
+from gradient_routes.problems.errors import NotConverged, SingularMatrix
+from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
+from gradient_routes.routes.load_stepping import by_load_steps
+from gradient_routes.routes.newton import Solver, State, Step, newton, norm
+from gradient_routes.routes.newton_steps import Chord, Direction, Doorways, Full, Inexact
+from gradient_routes.routes.solvers.factorization import Factorization, Factorizer
+from gradient_routes.routes.tally import Tally
 
 
 class Model:

@@ -9,11 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from problems.errors import NotConverged
-from problems.problem import Array
-from routes.directions import Direction
-from routes.factorization import Factorization, LinearSolver
-from routes.tally import Work
+from gradient_routes.problems.errors import NotConverged
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.newton_steps import Direction
+from gradient_routes.routes.solvers.factorization import Factorization, LinearSolver
+from gradient_routes.routes.tally import Work
 
 STEP_LENGTHS = tuple(0.5**i for i in range(9))
 DESCENT = 1e-4  # of |R|, times the step length, for a step to be taken

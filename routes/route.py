@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
-from problems.errors import InputError
-from problems.problem import OFFERED_AS, Array, Offers, Problem
-from routes.forward_work import ForwardWork
-from routes.model import Model
-from routes.tally import Work
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import OFFERED_AS, Array, Offers, Problem
+from gradient_routes.routes.forward_work import ForwardWork
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.tally import Work
 
 
 class Result(NamedTuple):

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.errors import InputError
-from problems.problem import Array
-from routes.model import Model
-from routes.newton import State
-from routes.refinement import LinearizedSolver
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.linearized_solve import LinearizedSolver
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State
 
 
 class Sensitivity:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.problem import Array, Operator
+from gradient_routes.problems.problem import Array, Operator
 
 OVERSAMPLED = 10  # directions more than singular values wanted
 SWEEPS = 2  # power iterations: (H H^T)^SWEEPS H, so that slow decay still separates

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.problem import Array
-from routes.model import Model
-from routes.refinement import Factors, LinearizedSolver, work
-from routes.route import ForwardWork, Offers, Result, Work, route
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.linearized_solve import Factors, LinearizedSolver, work
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, route
 
 
 def cost(n_p: int, forward: ForwardWork, *, factors: str) -> Work:

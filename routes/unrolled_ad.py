@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from problems.errors import InputError, Overflow
-from problems.problem import Array, Problem
-from routes.model import Model
-from routes.route import Affordable, ForwardWork, Gradient, Offers, Options, Result, Work, route
+from gradient_routes.problems.errors import InputError, Overflow
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import Affordable, ForwardWork, Gradient, Offers, Options, Result, Work, route
 
 Inner = Annotated[
     Literal["cg", "richardson", "jacobi", "direct"] | None,
@@ -113,7 +113,7 @@ def resolve(
     if iterations is None and inner == "direct":
         iterations = steps
     elif iterations is None:
-        from routes.iterations import iteration
+        from gradient_routes.routes.solvers.traced_iterations import iteration
 
         iterate = iteration(inner, model.traced)
         points = [problem.initial(p)] + ([] if state is None else [near(problem, state.u)])
@@ -176,9 +176,9 @@ def unrolled_ad(
 
 def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, checkpoint: int | None) -> Gradient:
     """Every linear iteration of every Newton step traced (jax.lax.scan) and compiled."""
-    from problems.jax64 import jax
-    from routes.differentiable import held_bytes
-    from routes.iterations import count_products, iteration, solution
+    from gradient_routes.problems.jax64 import jax
+    from gradient_routes.routes.differentiable import held_bytes
+    from gradient_routes.routes.solvers.traced_iterations import count_products, iteration, solution
 
     iterate, u_0 = iteration(inner, model.traced), model.problem.initial(p)
     what = f"{k} {inner} iterations" + (f" in each of {newton} Newton steps" if newton > 1 else "")
@@ -203,9 +203,9 @@ def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, 
 
 def through_newton(model: Model, k: int) -> Gradient:
     """Every Newton step recorded eagerly, its factors kept for its own transposed solve."""
-    from problems.jax64 import jax
-    from routes.differentiable import held_bytes
-    from routes.unrolled_newton import UnrolledNewton
+    from gradient_routes.problems.jax64 import jax
+    from gradient_routes.routes.differentiable import held_bytes
+    from gradient_routes.routes.unrolled_newton import UnrolledNewton
 
     u_k = UnrolledNewton(model, k)
     objective = jax.jit(model.traced.objective)

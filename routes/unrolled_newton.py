@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from problems.jax64 import jax, jnp
-from routes.factorization import Factorization
-from routes.model import Model
+from gradient_routes.problems.jax64 import jax, jnp
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.solvers.factorization import Factorization
 
 
 class Kept:

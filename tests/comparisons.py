@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.environment import environment
-from bench.gate.measured import Case, Measured, Verdict
-from bench.rows import empty_row
-from bench.store import Store
-from bench.study_rows import CHECKS
-from bench.timing import Samples
-from routes.tally import KINDS
+from gradient_routes.bench.cases.environment import environment
+from gradient_routes.bench.cases.row import empty_row
+from gradient_routes.bench.cases.samples import Samples
+from gradient_routes.bench.regression.measured import Case, Measured, Verdict
+from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies.columns import CHECKS
+from gradient_routes.routes.tally import KINDS
 
 MIB = 2**20
 HERE = environment()

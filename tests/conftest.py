@@ -24,18 +24,18 @@ from click.testing import CliRunner
 from commands import Ran, Shell
 from duffing.problem import Duffing
 
-from bench.cli import main
-from problems.advection import Advection
-from problems.bar import Bar
-from problems.block import Block
-from problems.problem import Array, Problem
-from routes.adjoint import adjoint
-from routes.complex_step import complex_step
-from routes.finite_difference import fd_central, fd_one_sided
-from routes.implicit_ad import implicit_ad
-from routes.route import Route
-from routes.tangent import tangent
-from routes.unrolled_ad import unrolled_ad
+from gradient_routes.bench.cli import main
+from gradient_routes.problems.advection import Advection
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.block import Block
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.complex_step import complex_step
+from gradient_routes.routes.finite_difference import fd_central, fd_one_sided
+from gradient_routes.routes.implicit_ad import implicit_ad
+from gradient_routes.routes.route import Route
+from gradient_routes.routes.tangent import tangent
+from gradient_routes.routes.unrolled_ad import unrolled_ad
 
 EXACT = (tangent, adjoint, complex_step, implicit_ad)
 ROUTES = (fd_one_sided, fd_central, *EXACT, unrolled_ad)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.problem import Array
+from gradient_routes.problems.problem import Array
 
 N = 1000
 A = np.random.default_rng(0).uniform(0.5, 2.0, N)

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from commands import ROOT, shell
 
-from bench.rows import COLUMNS
-from bench.store import Store
-from problems.bar import Bar
-from routes.tally import KINDS
+from gradient_routes.bench.cases.row import COLUMNS
+from gradient_routes.bench.store.store import Store
+from gradient_routes.problems.bar import Bar
+from gradient_routes.routes.tally import KINDS
 
 FIELDS = (
     "problem problem_options route route_options status reason n_state n_param objective gradient gradient_norm "
@@ -140,7 +140,7 @@ def test_iterations_that_turn_out_too_dear_are_not_taped(cli, tmp_path: Path) ->
 
 
 def test_a_tape_beyond_memory_is_not_tried(cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.bill.available_bytes", lambda: 10_000)
+    monkeypatch.setattr("gradient_routes.bench.execution.cost_model.available_bytes", lambda: 10_000)
     row = run(cli, "--json", route="unrolled-ad[iterations=100]").rows[0]
     assert "of memory at hand" in row["reason"]
     assert run(cli, "--json", "--budget", "inf", route="unrolled-ad[iterations=100]").rows[0]["status"] == "ok"

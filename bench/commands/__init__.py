@@ -1,1 +1,1 @@
-"""The verbs of the command line, one file each; nothing heavy is imported before it is needed."""
+"""Verbs that are not studies: what exists, what a store holds, and what changed."""

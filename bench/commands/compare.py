@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import debug_option, store_option
-from problems.errors import InputError
+from gradient_routes.bench.command_options import debug_option, store_option
+from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
-    from bench.gate.compare import Comparison
+    from gradient_routes.bench.regression.compare import Comparison
 
 BASELINE = Path("results") / "baseline.json"
 PATH = click.Path(path_type=Path)
@@ -55,10 +55,10 @@ def compare(
 
     Exit code: 0 nothing is worse, 1 a regression, 2 wrong usage.
     """
-    from bench import expected as expectations
-    from bench.files import check_writable
-    from bench.gate.baseline import measured
-    from bench.gate.compare import compare as compare_sides
+    from gradient_routes.bench.cases import expected as expectations
+    from gradient_routes.bench.regression.baseline import measured
+    from gradient_routes.bench.regression.compare import compare as compare_sides
+    from gradient_routes.bench.store.output_files import check_writable
 
     if not 1 < factor < float("inf"):
         raise InputError(f"--factor {factor:g} - give a number > 1")
@@ -78,9 +78,9 @@ def _format_of(output: Path | None) -> str:
 
 def _write(found: Comparison, format: str, output: Path | None) -> None:
     """To stdout, or to the file and the conclusion to stdout."""
-    from bench.views.compare import conclusion, show_comparison
-    from bench.views.compare_text import as_json, markdown
-    from bench.views.tables import console
+    from gradient_routes.bench.regression.text import as_json, markdown
+    from gradient_routes.bench.regression.view import conclusion, show_comparison
+    from gradient_routes.bench.render.terminal.tables import console
 
     where = nullcontext(sys.stdout) if output is None else output.open("w", encoding="utf-8")
     with where as file, redirect_stdout(file):
@@ -98,10 +98,10 @@ def _write(found: Comparison, format: str, output: Path | None) -> None:
 @debug_option
 def baseline(output: Path, store: Path) -> None:
     """Write the latest row of every case and verdict of a store as a small text file, for `routes compare`."""
-    from bench.files import check_writable
-    from bench.gate.baseline import write
-    from bench.gate.measured import of_store
-    from bench.store import Store
+    from gradient_routes.bench.regression.baseline import write
+    from gradient_routes.bench.regression.measured import of_store
+    from gradient_routes.bench.store.output_files import check_writable
+    from gradient_routes.bench.store.store import Store
 
     found = of_store(Store(store))
     output.parent.mkdir(parents=True, exist_ok=True)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bench.commands.shared import debug_option, store_option
+from gradient_routes.bench.command_options import debug_option, store_option
 
 if TYPE_CHECKING:
-    from bench.store import Store
+    from gradient_routes.bench.store.store import Store
 
 OUTPUT = "File to write; its name says the format: report.html, report.md."
 FORMAT = "[that of FILE's name, else html]"
@@ -32,13 +32,13 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
     routes report -o report.html                      one page that needs no server and no network
     routes report --format md -o report.md --figures figures
     """
-    from bench.store import Store
+    from gradient_routes.bench.store.store import Store
 
     kept = Store(store)
     if output is None and format is None and figures is None:
         _print(kept)
         return
-    from bench.report.writing import report as write
+    from gradient_routes.bench.render.writing import report as write
 
     if output is not None and format is None:
         format = "md" if output.suffix.lower() in (".md", ".markdown") else "html"
@@ -48,8 +48,8 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
 
 
 def _print(store: Store) -> None:
-    from bench.commands.run import show
-    from bench.views.tables import console
+    from gradient_routes.bench.render.terminal.tables import console
+    from gradient_routes.bench.studies.bill.command import show
 
     show(store.rows())
     console().print(MORE, style="dim", soft_wrap=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from bench.commands.shared import debug_option, store_option
+from gradient_routes.bench.command_options import debug_option, store_option
 
 
 @click.command()
@@ -24,11 +24,11 @@ def status(as_json: bool, store: Path) -> None:
 
     `routes run ... --resume` runs what is missing, failed or stale.
     """
-    from bench.rows import as_json as json_line
-    from bench.status import counts, standings
-    from bench.store import Store
-    from bench.views import tables
-    from bench.views.status import matrix
+    from gradient_routes.bench.cases.row import as_json as json_line
+    from gradient_routes.bench.commands.status_view import matrix
+    from gradient_routes.bench.render.terminal import tables
+    from gradient_routes.bench.store.status import counts, standings
+    from gradient_routes.bench.store.store import Store
 
     found = standings(Store(store))
     if as_json:

@@ -1,1 +1,1 @@
-"""From gradients to answers: J minimized with any route as the engine."""
+"""Inversion: J minimized with any route as the source of gradients."""

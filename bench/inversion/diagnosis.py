@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.accuracy import norm2
-from bench.inversion.objective import OUTSIDE, Objective
-from problems.problem import Array
+from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.inversion.objective import OUTSIDE, Objective
+from gradient_routes.problems.problem import Array
 
 AT_MINIMUM = "J cannot be told apart from its minimum"
 STEPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # of x, relative to its size where that is above one

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bench.accuracy import norm2
-from bench.inversion.objective import Evaluation, Objective
-from problems.problem import Array
+from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.inversion.objective import Evaluation, Objective
+from gradient_routes.problems.problem import Array
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """One accepted step. Columns as in bench.study_rows."""
+    """One accepted step. Columns as in bench.studies.columns."""
 
     iteration: int
     objective: float

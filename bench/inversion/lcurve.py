@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.case import ProblemSpec, RouteSpec
-from bench.inversion.diagnosis import AT_MINIMUM
-from bench.inversion.invert import Engine, Inversion, invert
-from bench.rows import Row
-from problems.errors import InputError
-from problems.problem import Array
+from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.inversion.diagnosis import AT_MINIMUM
+from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array
 
 BENT = 3  # points that a curvature takes
 
 
 @dataclass(frozen=True)
 class Point:
-    """The minimum of J at one alpha. Columns as in bench.study_rows."""
+    """The minimum of J at one alpha. Columns as in bench.studies.columns."""
 
     inversion: Inversion
     misfit: float

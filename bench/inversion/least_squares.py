@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from bench.inversion.diagnosis import explained
-from bench.inversion.history import History
-from bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from bench.inversion.optimizers import Ended, Limits, Watching, accept, spent, start_of
-from problems.errors import InputError
-from problems.problem import Array
-from routes.newton import State
-from routes.sensitivity import Sensitivity
+from gradient_routes.bench.inversion.diagnosis import explained
+from gradient_routes.bench.inversion.history import History
+from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
+from gradient_routes.bench.inversion.optimizers import Ended, Limits, Watching, accept, spent, start_of
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.newton import State
+from gradient_routes.routes.sensitivity import Sensitivity
 
 WALL = 30.0  # times the residuals of the last step, where J is not defined: no region can be trusted there
 LSMR = {"regularize": False, "atol": 1e-8, "btol": 1e-8}  # whole Gauss-Newton steps

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench.case import RouteSpec
-from bench.inversion.history import History
-from bench.inversion.invert import Engine
-from bench.inversion.objective import Objective
-from bench.inversion.optimizers import Ended, Limits, adam
-from problems.errors import InputError
-from problems.problem import Array, Problem
+from gradient_routes.bench.cases.case import RouteSpec
+from gradient_routes.bench.inversion.history import History
+from gradient_routes.bench.inversion.invert import Engine
+from gradient_routes.bench.inversion.objective import Objective
+from gradient_routes.bench.inversion.optimizers import Ended, Limits, adam
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Problem
 
 
 def minibatched(problem: Problem, route: RouteSpec, engine: Engine, count: int, seed: int) -> Callable[..., str]:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from bench.accuracy import norm2
-from bench.inversion.variables import Variables
-from problems.errors import DomainError, NotConverged, Overflow, SingularMatrix
-from problems.problem import Array, Problem
-from routes.model import Model
-from routes.newton import Solver
-from routes.route import Options, Route
+from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.inversion.variables import Variables
+from gradient_routes.problems.errors import DomainError, NotConverged, Overflow, SingularMatrix
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.route import Options, Route
 
 OUTSIDE = (DomainError, NotConverged, SingularMatrix, Overflow, FloatingPointError)
 SAME = 1e-5  # of J: no tolerance of a forward solve

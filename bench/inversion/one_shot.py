@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.case import RouteSpec, point
-from bench.inversion.invert import Engine
-from bench.inversion.least_squares import Residuals
-from bench.inversion.objective import Objective
-from bench.inversion.variables import Variables
-from problems.problem import Array, Problem
+from gradient_routes.bench.cases.case import RouteSpec, point
+from gradient_routes.bench.inversion.invert import Engine
+from gradient_routes.bench.inversion.least_squares import Residuals
+from gradient_routes.bench.inversion.objective import Objective
+from gradient_routes.bench.inversion.variables import Variables
+from gradient_routes.problems.problem import Array, Problem
 
 ROUNDING = 1e-14  # LSMR's tolerances: the answer itself, not an estimate of it
 

@@ -8,11 +8,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bench.accuracy import norm2
-from bench.inversion.diagnosis import explained
-from bench.inversion.history import History
-from bench.inversion.objective import Objective
-from problems.problem import Array
+from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.inversion.diagnosis import explained
+from gradient_routes.bench.inversion.history import History
+from gradient_routes.bench.inversion.objective import Objective
+from gradient_routes.problems.problem import Array
 
 Name = Literal["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 DIVERGED = 1e3  # times J at the start
@@ -139,7 +139,7 @@ def spent(limits: Limits) -> str:
 
 def optimizer(name: Name) -> Callable[..., str]:
     """(objective, history, limits) -> why it ended."""
-    from bench.inversion import least_squares
+    from gradient_routes.bench.inversion import least_squares
 
     return {
         "lbfgs": lbfgs,

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.case import ProblemSpec, RouteSpec
-from bench.rows import clean
-from bench.store import Store
-from problems.errors import InputError
-from problems.problem import Array
+from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.row import clean
+from gradient_routes.bench.store.store import Store
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array
 
 
 def last_estimate(path: Path, spec: ProblemSpec, route: RouteSpec, optimizer: str, at: str) -> tuple[Array, int]:

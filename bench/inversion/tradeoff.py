@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.case import ProblemSpec, RouteSpec
-from bench.inversion.invert import Engine, Inversion, invert
-from bench.rows import Row
-from problems.errors import InputError
-from problems.problem import Array, Problem
-from routes.model import Model
-from routes.twin import CONVERGED
+from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.synthetic_data import CONVERGED
 
 
 @dataclass(frozen=True)

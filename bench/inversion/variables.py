@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from problems.errors import InputError
-from problems.problem import Array, Parameters
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Parameters
 
 Positive = Literal["none", "log", "softplus"]
 DECADES = 3.0  # that natural changes of parameters may span before it is worth a warning

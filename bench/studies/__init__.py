@@ -1,1 +1,1 @@
-"""One question per file, answered by measurement."""
+"""Studies: one question per folder, answered by measurement."""

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from problems.advection import Advection
-from problems.bar import Bar
-from problems.block import Block
-from problems.problem import Problem
-from routes.model import Model
+from gradient_routes.problems.advection import Advection
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.block import Block
+from gradient_routes.problems.problem import Problem
+from gradient_routes.routes.model import Model
 
 pytest_plugins = ("measuring",)
 pytestmark = pytest.mark.benchmark(group="kernels")

@@ -7,17 +7,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from problems.advection import Advection
-from problems.bar import Bar
-from problems.block import Block
-from problems.problem import Array, Problem
-from routes.adjoint import adjoint
-from routes.finite_difference import fd_central
-from routes.implicit_ad import implicit_ad
-from routes.model import Model
-from routes.route import Route
-from routes.tangent import tangent
-from routes.unrolled_ad import unrolled_ad
+from gradient_routes.problems.advection import Advection
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.block import Block
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.finite_difference import fd_central
+from gradient_routes.routes.implicit_ad import implicit_ad
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import Route
+from gradient_routes.routes.tangent import tangent
+from gradient_routes.routes.unrolled_ad import unrolled_ad
 
 pytest_plugins = ("measuring",)
 PROBLEMS = {

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from calibration import calibration
 
-from problems.problem import Array
-from routes.model import Model
-from routes.route import Route
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import Route
 
 
 @pytest.fixture(autouse=True)

@@ -14,9 +14,9 @@ from contextlib import suppress
 
 import numpy as np
 
-from problems.problem import Array, Offers, Parameters, Problem, Reference
-from routes.model import Model
-from routes.route import Result, Work, route
+from gradient_routes.problems.problem import Array, Offers, Parameters, Problem, Reference
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import Result, Work, route
 
 C = ctypes.CDLL(None)
 C.malloc.restype = ctypes.c_void_p
@@ -188,8 +188,8 @@ def take_by_child() -> None:
 
 def factorize() -> None:
     """With next to no memory left, a matrix that is positive definite."""
-    from problems.sparse import SymmetricPattern
-    from routes.factorization import Factorizer
+    from gradient_routes.problems.matrices.sparse import SymmetricPattern
+    from gradient_routes.routes.solvers.factorization import Factorizer
 
     n = 22
     nodes, one, other = np.arange(n**3).reshape(n, n, n), range(n - 1), range(1, n)

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import numpy as np
 
-from problems.errors import InputError
-from problems.problem import Array, Linearization, Offers, Parameters, Problem
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem
 
 
 class Duffing(Problem):

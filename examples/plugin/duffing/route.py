@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from problems.problem import Array, Offers
-from routes.finite_difference import EPS, shifted, steps
-from routes.model import Model
-from routes.route import ForwardWork, Result, Work, route
+from gradient_routes.problems.problem import Array, Offers
+from gradient_routes.routes.finite_difference import EPS, shifted, steps
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import ForwardWork, Result, Work, route
 
 STEP = EPS ** (1 / 5)  # balances the truncation h^4 against the round-off eps / h
 

@@ -1,0 +1,1 @@
+"""Cases: selectors, options, the registry, and the row that each case becomes."""

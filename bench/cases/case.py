@@ -1,0 +1,137 @@
+"""A case: one problem with its options, one route with its options, one point p."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gradient_routes.bench.cases import options, registry, selector
+from gradient_routes.problems.data.csv import read_columns
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Parameters, Problem
+from gradient_routes.routes.route import Route
+from gradient_routes.routes.synthetic_data import with_synthetic_data
+
+
+@dataclass(frozen=True)
+class ProblemSpec:
+    """A problem still to be built, its synthetic data, if it wants any, solved for."""
+
+    name: str
+    options: dict[str, Any]
+    build: Any
+
+    @property
+    def selector(self) -> str:
+        """Its name with the options that are not its defaults."""
+        return _written(self.name, self.options, self.build)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return problem_named, (self.name, self.options)  # code is found by its name wherever it is sent
+
+    def __call__(self) -> Problem:
+        problem = self.build(**self.options)
+        if not isinstance(problem, Problem) or not isinstance(problem.parameters, Parameters):
+            raise TypeError(f"its factory made a {type(problem).__name__}, not a Problem with Parameters")
+        return with_synthetic_data(problem)
+
+
+@dataclass(frozen=True)
+class RouteSpec:
+    """A route with its options as given; data-dependent defaults are still open (None)."""
+
+    name: str
+    route: Route
+    options: dict[str, Any]
+
+    @property
+    def selector(self) -> str:
+        """Its name with the options that are not its defaults."""
+        return _written(self.name, self.options, self.route)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return route_named, (self.name, self.options)
+
+
+def _written(name: str, given: dict[str, Any], target: Any) -> str:
+    declared = options.options_of(registry.factory_of(target))
+    return selector.written(name, given, {name: option.default for name, option in declared.items()})
+
+
+def problem_named(name: str, options: dict[str, Any]) -> ProblemSpec:
+    """Raises InputError for a name that is not known here."""
+    return ProblemSpec(name, options, registry.find("problem", name).load())
+
+
+def route_named(name: str, options: dict[str, Any]) -> RouteSpec:
+    """Raises InputError for a name that is not known here."""
+    return RouteSpec(name, registry.find("route", name).load(), options)
+
+
+def problems(selectors: Iterable[str]) -> list[ProblemSpec]:
+    """All problems that the selectors name, grids expanded. Raises InputError."""
+    return [ProblemSpec(name, opts, target) for name, opts, target in _specs("problem", selectors)]
+
+
+def routes(selectors: Iterable[str]) -> list[RouteSpec]:
+    """All routes that the selectors name, grids expanded. Raises InputError."""
+    specs = [RouteSpec(name, target, opts) for name, opts, target in _specs("route", selectors)]
+    for spec in specs:
+        spec.route.check(**spec.options)
+    return specs
+
+
+def left_out(problem_selectors: Iterable[str], route_selectors: Iterable[str]) -> list[str]:
+    """Why entries that `all` would name are not among them."""
+    kinds: dict[registry.Kind, Iterable[str]] = {"problem": problem_selectors, "route": route_selectors}
+    entries = [entry for kind, texts in kinds.items() if "all" in texts for entry in registry.entries(kind).values()]
+    return [failure for entry in entries if (failure := entry.failure) is not None]
+
+
+def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str, dict[str, Any], Any]]:
+    seen: list[tuple[str, dict[str, Any]]] = []
+    for text in selectors:
+        chosen = selector.parse(text)
+        if chosen.name == "all":
+            if chosen.grid:
+                raise InputError(f"selector '{text}' - 'all' takes no options; name the {kind} to set one")
+            names = [name for name, entry in registry.entries(kind).items() if entry.sound]
+        else:
+            names = [chosen.name]
+        for name in names:
+            target = registry.find(kind, name).load()
+            for given in chosen.expand():
+                resolved = options.resolve(registry.factory_of(target), given, name)
+                if (name, resolved) not in seen:
+                    seen.append((name, resolved))
+                    yield name, resolved, target
+
+
+def point(problem: Problem, at: str) -> Array:
+    """p (n_p,) for `start`, `true` or a CSV file of one column. Raises InputError, DomainError."""
+    if at == "start":
+        return problem.parameters.check(problem.parameters.start.copy(), f"{problem.name}, start")
+    if at == "true":
+        truth = problem.truth()
+        if truth is None:
+            raise InputError(f"{problem.name}: the true parameters are not known - use --at start or --at FILE.csv")
+        return problem.parameters.check(truth, f"{problem.name}, true")
+    columns = read_columns(at, None)
+    if len(columns) != 1:
+        raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
+    return problem.parameters.check(next(iter(columns.values())), at)
+
+
+def sized(spec: ProblemSpec, at: str) -> tuple[int, int]:
+    """n_u and n_p of a problem, built without its synthetic data. Raises as its factory and `point` do."""
+    problem = spec.build(**spec.options)
+    return problem.n_state, len(point(problem, "start" if at == "true" else at))
+
+
+def files(specs: Iterable[ProblemSpec], at: str) -> list[Path]:
+    """The files that problems and `at` read."""
+    texts = [at, *(value for spec in specs for value in spec.options.values() if isinstance(value, str))]
+    return [Path(text) for text in texts if os.path.isfile(text)]

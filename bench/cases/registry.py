@@ -1,0 +1,131 @@
+"""What exists: problems and routes, built-in and from plug-ins, all by entry points, loaded when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Literal
+
+from gradient_routes.bench.cases.imported import imported, is_reference
+from gradient_routes.bench.cases.suggest import did_you_mean
+from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.route import Route
+
+Kind = Literal["problem", "route"]
+BUILT_IN = "gradient-routes"
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """`FILE.py:NAME` or `package.module:NAME` in place of an entry point."""
+
+    name: str
+    dist: None = None
+
+    def load(self) -> Any:
+        return imported(self.name)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A registered name; `load` imports it, `failure` says why it cannot be imported (None if it can)."""
+
+    kind: Kind
+    point: EntryPoint | Pointer
+
+    @property
+    def name(self) -> str:
+        return self.point.name
+
+    @property
+    def origin(self) -> str:
+        """The distribution that registered it."""
+        return self.point.dist.name if self.point.dist else self.point.name
+
+    def load(self) -> Any:
+        """The factory of a problem, or the Route. Raises InputError with the reason if that fails."""
+        try:
+            target = self.point.load()
+        except InputError:
+            raise
+        except (Exception, SystemExit) as error:  # a plug-in may raise anything while it is imported
+            said = " ".join(str(error).split())
+            raise InputError(
+                f"{self.kind} '{self.name}' of {self.origin} cannot be imported: {type(error).__name__}: {said}"
+                f" - mend or uninstall {self.origin}"
+            ) from error
+        if self.kind == "route" and not isinstance(target, Route):
+            raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
+        if self.kind == "route" and isinstance(self.point, EntryPoint) and target.name != self.name:
+            raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
+        if self.kind == "problem" and not callable(target):
+            raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
+        return target
+
+    @property
+    def sound(self) -> bool:
+        """Whether `all` names it: it can be imported, and is not wrong on purpose."""
+        return self.failure is None and getattr(self.load(), "sound", True)
+
+    @property
+    def failure(self) -> str | None:
+        try:
+            self.load()
+        except InputError as error:
+            return str(error)
+        return None
+
+
+@cache
+def registered(kind: Kind) -> list[Entry]:
+    """All entries of a kind, built-ins first."""
+    found = [Entry(kind, point) for point in entry_points(group=f"gradient_routes.{kind}s")]
+    return sorted(found, key=lambda e: (e.origin != BUILT_IN, *place(e.name)))
+
+
+def place(name: str) -> tuple[int, str]:
+    """A key to sort names by: the story's, then the others'."""
+    return ORDER.index(name) if name in ORDER else len(ORDER), name
+
+
+@cache
+def entries(kind: Kind) -> dict[str, Entry]:
+    """The entries that count: of two with one name, the built-in or first one."""
+    first: dict[str, Entry] = {}
+    for entry in registered(kind):
+        first.setdefault(entry.name, entry)
+    return first
+
+
+# the order of the story: from nothing but J to the whole structure
+ORDER = (
+    "bar",
+    "block",
+    "advection",
+    "fd-one-sided",
+    "fd-central",
+    "complex-step",
+    "tangent",
+    "adjoint",
+    "unrolled-ad",
+    "implicit-ad",
+    "faulty-adjoint",
+)
+
+
+def find(kind: Kind, name: str) -> Entry:
+    """The entry of that name, or what `FILE.py:NAME` points to. Raises InputError with the nearest name."""
+    if is_reference(name):
+        return Entry(kind, Pointer(name))
+    known = entries(kind)
+    if name not in known:
+        raise InputError(f"no {kind} '{name}' - {did_you_mean(name, known)}")
+    return known[name]
+
+
+def factory_of(target: Any) -> Callable[..., Any]:
+    """What declares the options: a route's function, or the problem's factory itself."""
+    function: Callable[..., Any] = target.function if isinstance(target, Route) else target
+    return function

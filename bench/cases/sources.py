@@ -1,0 +1,118 @@
+"""The source that an object's code is made of: its file and what that imports of its own project, and of this one."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import gradient_routes
+from gradient_routes.routes.route import Route
+
+HERE = Path(gradient_routes.__file__).absolute().parent.parent  # what `gradient_routes` is imported from
+OURS = ("gradient_routes.problems", "gradient_routes.routes")  # floors that a gradient can depend on
+
+
+Stamp = tuple[str, int, int]  # a file, when it was last written [ns], its size
+
+
+def digest(target: Any) -> str:
+    """Of the source of a factory or a Route; of its name where it has no source that can be read."""
+    return _source(target)[0]
+
+
+def stamps(target: Any) -> tuple[Stamp, ...]:
+    """The files that the digest is of, as they were when it was taken."""
+    return _source(target)[1]
+
+
+def stamp(file: Path) -> Stamp:
+    status = file.stat()
+    return str(file), status.st_mtime_ns, status.st_size
+
+
+def changed(known: tuple[Stamp, ...]) -> str | None:
+    """The first of these files that is no longer as it was."""
+    for name, *then in known:
+        file = Path(name)
+        if not file.is_file() or [*stamp(file)[1:]] != then:
+            return name
+    return None
+
+
+def _source(target: Any) -> tuple[str, tuple[Stamp, ...]]:
+    function = target.function if isinstance(target, Route) else target
+    module = sys.modules.get(getattr(function, "__module__", None) or "")
+    name, file = getattr(module, "__name__", ""), getattr(module, "__file__", None)
+    if file is None or not Path(file).is_file():
+        return hashlib.sha256(f"{name}.{getattr(function, '__qualname__', '')}".encode()).hexdigest(), ()
+    return _digest(Path(file).absolute(), name)
+
+
+@cache
+def _digest(path: Path, module: str) -> tuple[str, tuple[Stamp, ...]]:
+    alone = module.startswith("_routes_")  # a file that was named, see bench.cases.imported
+    root = path.parent if alone else path.parents[module.count(".") + (path.name == "__init__.py")]
+    summed = hashlib.sha256()
+    files = closure(path, root, None if alone else module.partition(".")[0])
+    known = tuple(stamp(file) for file in sorted(files))  # first: what is written while it is read shows later
+    for name, source in sorted((file.name, file.read_bytes()) for file in files):  # wherever they are installed
+        summed.update(name.encode() + b"\0" + source + b"\0")
+    return summed.hexdigest(), known
+
+
+def closure(path: Path, root: Path, top: str | None) -> set[Path]:
+    """`path` and every file below `root` that it imports, directly or not: those of package `top`, or whatever lies
+    beside where that is None; and those of this project's lower floors.
+    """
+    found: set[Path] = set()
+    waiting = [path]
+    while waiting:
+        file = waiting.pop()
+        if file in found:
+            continue
+        found.add(file)
+        for name in imported_names(file, root if file.is_relative_to(root) else HERE):
+            name = defined_in(name)
+            if name.startswith(OURS):
+                waiting += located(name, HERE)
+            elif top is None or (name.partition(".")[0] == top != gradient_routes.__name__):
+                waiting += located(name, root)
+    return found
+
+
+def imported_names(file: Path, root: Path) -> Iterator[str]:
+    """Dotted names that a file imports anywhere, relative ones resolved; of `from a import b` both a and a.b."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError):  # it will say so itself when it is imported
+        return
+    package = file.parent.relative_to(root).parts if file.is_relative_to(root) else ()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield base
+            yield from (f"{base}.{alias.name}".lstrip(".") for alias in node.names)
+
+
+def defined_in(name: str) -> str:
+    """The module of a public name of this package, `gradient_routes.Problem` say; other names as they are."""
+    package, _, public = name.partition(".")
+    return gradient_routes.PUBLIC.get(public, name) if package == gradient_routes.__name__ else name
+
+
+def located(name: str, root: Path) -> list[Path]:
+    """The files a dotted name loads, of those below root: every package's __init__ on the way, and the module."""
+    files: list[Path] = []
+    here = root
+    for part in name.split("."):
+        here = here / part
+        files += [f for f in (here / "__init__.py", here.with_suffix(".py")) if f.is_file()]
+    return [f for f in files if f.parent != HERE / gradient_routes.__name__]

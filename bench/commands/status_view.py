@@ -1,0 +1,36 @@
+"""The matrix of a store: problems down, routes across, what became of each."""
+
+from __future__ import annotations
+
+from rich.table import Table
+from rich.text import Text
+
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.row import ANSWERED
+from gradient_routes.bench.render.terminal.palette import route_style
+from gradient_routes.bench.render.terminal.tables import asked
+from gradient_routes.bench.store.status import Standing, counts
+
+
+def matrix(standing: list[Standing]) -> Table:
+    """A line a problem with its settings, a column a route; several options of one route share a cell."""
+    cells: dict[str, dict[str, list[Standing]]] = {}
+    for each in standing:
+        cells.setdefault(asked(each.row), {}).setdefault(each.row["route"], []).append(each)
+    routes = sorted({each.row["route"] for each in standing}, key=registry.place)
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("problem", overflow="fold", min_width=14)
+    for route in routes:
+        table.add_column(Text(route, style=route_style(route)), overflow="fold")
+    for problem, found in cells.items():
+        table.add_row(Text(problem), *(_cell(found.get(route, [])) for route in routes))
+    return table
+
+
+def _cell(standing: list[Standing]) -> Text:
+    if not standing:
+        return Text("-", style="dim")
+    words = standing[0].word if len(standing) == 1 else counts(standing)
+    well = all(each.row["status"] in ANSWERED for each in standing)
+    style = "bold red" if not well else "yellow" if any(each.aged for each in standing) else ""
+    return Text(words, style=style)

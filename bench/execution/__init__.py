@@ -1,0 +1,1 @@
+"""Execution: measured phases of a case, confined processes, executors, limits."""

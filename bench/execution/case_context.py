@@ -1,0 +1,117 @@
+"""One problem at one p, with what the routes run on it share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from gradient_routes.bench.cases.case import ProblemSpec, point
+from gradient_routes.bench.cases.outcome import View
+from gradient_routes.bench.cases.partial import Partial
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
+from gradient_routes.bench.execution.references import Found, Judge, Judges
+from gradient_routes.bench.execution.timing import seconds_of
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Fields, Offers, ParameterView, Problem
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State
+from gradient_routes.routes.route import Options, Result, Route
+
+
+class Workbench:
+    """A problem at one p, with what all its routes share: prices and references.
+
+    `found` are references known from before. Raises InputError and DomainError, and what the problem raises.
+    """
+
+    def __init__(self, spec: ProblemSpec, settings: Settings, found: Found | None = None) -> None:
+        self.spec, self.settings = spec, settings
+        self.problem: Problem
+        self.build_s, self.problem = seconds_of(spec)
+        self.p = point(self.problem, settings.at)
+        self.n_p = len(self.p)
+        if settings.fields and type(self.problem).fields is Problem.fields:
+            raise InputError(f"{self.problem.name}: has no mesh to write fields on - drop --vtu")
+        self.partial = self._restrict(settings.partial)
+        self.p.flags.writeable = False  # shared by all routes
+        direct = replace(settings.solver, linear_solver="auto", newton="full")  # a judge is no fellow of the judged
+        self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_judge, found)
+        self._forward_model = self.model()
+        self._priced: tuple[Prices, State | None] | Exception | None = None
+
+    def _restrict(self, partial: Partial | None) -> str | None:
+        """From here on the problem is the one in the few parameters asked for; what they are, None for all."""
+        few = None if partial is None else partial.restrict(self.problem, self.p)
+        if partial is None or few is None:
+            return None
+        self.problem, self.p = few, few.parameters.start.copy()
+        return partial.of(self.n_p)
+
+    def model(self) -> Model:
+        return Model(self.problem, self.settings.solver)
+
+    def predict(self, n_p: int, route: Route, options: Options, row: Row) -> str | None:
+        """Fill in the predicted bill; why it is not paid, or None."""
+        work = route.cost(n_p, self.prices.declared, **options)
+        tape = None if route.tape is None else route.tape(self.problem, **options)
+        row |= {
+            "predicted_s": self.prices.seconds(work),
+            "predicted_tape_bytes": tape,
+            "predicted_work": asdict(work),
+        }
+        return unaffordable(row["predicted_s"], tape, work, self.settings.budget)
+
+    def _unaffordable_judge(self, route: Route, n_p: int) -> str | None:
+        return self.predict(n_p, route, route.defaults, {})
+
+    def price(self) -> tuple[Prices, State | None]:
+        """Prices and the state they were measured on; a forward solve that fails is not tried again."""
+        if self._priced is None:
+            try:
+                self._priced = prices(self._forward_model, self.p)
+            except Exception as failure:  # raised again, for every route
+                self._priced = failure
+        if isinstance(self._priced, Exception):
+            raise self._priced
+        return self._priced
+
+    @property
+    def prices(self) -> Prices:
+        return self.price()[0]
+
+    def objective(self) -> float:
+        """J(p) of the forward solve that set the prices."""
+        state = self.price()[1]
+        return self.model().value(self.p) if state is None else float(state.J)
+
+    def forward(self) -> Callable[[], Any]:
+        model = self._forward_model  # has analyzed its matrices, as the route's own has by now
+        solvable = Offers.SOLVE in self.problem.offers
+        return (lambda: model.solve(self.p)) if solvable else (lambda: model.value(self.p))
+
+    def view(self, route: Route, result: Result) -> View | None:
+        if not self.settings.gradient:
+            return None
+        u = self._state_of(result)
+        columns = ParameterView() if u is None else self.problem.view(self.p, u, result.lam)
+        judge = self.judges.judge(route)
+        reference = judge.whole if isinstance(judge, Judge) else None
+        q = self.problem.parameters
+        labels, units = zip(*((q.label(i), q.unit_of(i)) for i in range(len(q))), strict=True)
+        return View([*labels], [*units], q.position, self.p, np.asarray(result.gradient), reference, columns)
+
+    def fields(self, result: Result) -> Fields | None:
+        u = self._state_of(result)
+        if u is None or not self.settings.fields:
+            return None
+        return self.problem.fields(self.p, u, result.lam, np.asarray(result.gradient))
+
+    def _state_of(self, result: Result) -> Array | None:
+        """u of the route, or of the forward solve that set the prices; None for a black box."""
+        state = self.price()[1]
+        return result.u if result.u is not None or state is None else state.u

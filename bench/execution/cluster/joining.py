@@ -1,0 +1,72 @@
+"""Dask clusters: one of somebody's, at its scheduler's address, or one of this machine."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from multiprocessing import resource_tracker
+
+from distributed import Client, LocalCluster
+from distributed.versions import VersionMismatchWarning
+
+from gradient_routes.problems.errors import InputError
+
+TIMEOUT = 10.0  # [s] for a scheduler to answer
+
+
+@contextmanager
+def joined(address: str) -> Iterator[Client]:
+    """A client of the scheduler at `address`. Raises InputError where none answers, or one of another Dask."""
+    quiet()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", VersionMismatchWarning)  # what has to be equal is compared worker by worker
+            client = Client(address, timeout=TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        said = " ".join(str(error.__cause__ or error).split())
+        raise InputError(
+            f"--scheduler {address}: no Dask scheduler answers within {TIMEOUT:g} s ({said})"
+            " - start one: dask scheduler; and give the address it prints"
+        ) from error
+    with client:
+        theirs, ours = client.run_on_scheduler(version, "distributed"), version("distributed")
+        if theirs != ours:
+            raise InputError(f"--scheduler {address}: has distributed {theirs} (here {ours}) - install the same here")
+        yield client
+
+
+@contextmanager
+def local(workers: int) -> Iterator[Client]:
+    """A client of so many workers on this machine, gone with it."""
+    quiet()
+    with (
+        LocalCluster(
+            n_workers=0,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            memory_limit=0,  # cases have limits of their own, in processes that Dask does not see
+            dashboard_address="127.0.0.1:0",
+            worker_dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, timeout=TIMEOUT, set_as_default=False) as client,
+    ):
+        cluster.sync(deaf)
+        cluster.scale(workers)
+        yield client
+
+
+async def deaf() -> None:
+    """Ctrl-C in a terminal is for this process to handle: the workers that this thread starts inherit the mask."""
+    resource_tracker.ensure_running()  # it would be started with the first worker, and take off the mask
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+def quiet() -> None:
+    """What happens to workers is told in rows and in lines of this project."""
+    for name in ("distributed", "distributed.client", "tornado"):  # Dask gives each a level
+        logging.getLogger(name).setLevel(logging.CRITICAL)

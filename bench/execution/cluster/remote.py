@@ -1,0 +1,93 @@
+"""What runs on a worker of a Dask cluster: who it is, and a case from its start to its end."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from threading import Event, Thread
+from typing import Any
+
+from distributed import Worker, get_worker
+from distributed.core import Status
+
+from gradient_routes.bench.cases.environment import Environment, environment
+from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.execution.cluster.shipped_case import Sealed
+from gradient_routes.bench.execution.executors.isolated import Isolated
+from gradient_routes.bench.execution.executors.running import alone
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.units import now
+
+TICK = 0.2  # [s] between two looks whether anybody still waits for the case
+ENDING = (Status.closing, Status.closing_gracefully, Status.closed, Status.failed)
+
+
+@dataclass(frozen=True)
+class Greeting:
+    """Which process a worker is, on which host, with which libraries."""
+
+    hostname: str
+    pid: int
+    environment: Environment
+
+
+def greeting() -> Greeting:
+    """Of this process."""
+    return Greeting(socket.gethostname(), os.getpid(), environment())
+
+
+def packed(case: Sealed, limits: Limits, cwd: str) -> bytes:
+    """For carry; Dask looks into anything but bytes."""
+    return pickle.dumps((case, limits, cwd))
+
+
+def carry(parcel: bytes, pid: int) -> bytes | None:
+    """A case in its own process, as everywhere: its outcome and what was found on the way, pickled.
+
+    None from a process other than `pid`: a worker was lost, and another one has its address.
+    """
+    if os.getpid() != pid:
+        return None
+    case, limits, cwd = pickle.loads(parcel)
+    os.environ.pop("MALLOC_TRIM_THRESHOLD_", None)  # a nanny's, for its worker: it would slow down what cases allocate
+    case = replace(case, row=case.row | {"host": socket.gethostname(), "started": now()})
+    if not os.path.isdir(cwd):
+        what = f"no folder {cwd} on {case.row['host']} - start from one that all hosts have, or make it there"
+        outcome = Outcome(case.row | {"status": "failed", "reason": f"{case.row['route']}: {what}"})
+        return pickle.dumps((outcome, case.found))
+    under_way = Isolated(case, limits, cwd)
+    with while_wanted(under_way):
+        outcome = under_way.prepared() or alone(under_way)
+    return pickle.dumps((outcome, case.found))
+
+
+@contextmanager
+def while_wanted(case: Isolated) -> Iterator[None]:
+    """The process of the case ends with the block, or when nobody waits for it any more."""
+    worker, over = get_worker(), Event()
+    key = worker.get_current_task()
+
+    def watch() -> None:
+        while not over.wait(TICK):
+            if not wanted(worker, key):
+                case.kill()
+                return
+
+    watching = Thread(target=watch, daemon=True)
+    watching.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watching.join()
+        case.close()
+
+
+def wanted(worker: Worker, key: Any) -> bool:
+    """Whether the scheduler still wants it, and the worker is there to hand it over."""
+    task = worker.state.tasks.get(key)
+    return task is not None and task.state == "executing" and worker.status not in ENDING

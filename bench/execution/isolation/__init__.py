@@ -1,0 +1,1 @@
+"""Processes in groups of their own, with limits, watched from outside."""

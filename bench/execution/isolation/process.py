@@ -1,0 +1,189 @@
+"""A process in a group of its own: watched, and killed with all it started when it takes more than it may."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import IO, Any
+
+import psutil
+
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.stack import ASKED, without
+from gradient_routes.bench.units import size
+
+TICK = 0.1  # [s] between two looks at its memory
+GRACE = 5.0  # [s] for the end of what has hung up
+KEPT = 20_000  # bytes of stderr
+LAST = 60  # lines of it
+STACK = None if ASKED is None else (ASKED, 0.2)  # it has so many seconds to write its stack
+EXHAUSTED = (
+    *("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory"),
+    "Memory allocation still failed",  # OpenBLAS
+)
+
+
+class Killed(Exception):
+    """The process was killed at a limit: `status` is timeout or out-of-memory, `reason` has the numbers."""
+
+    def __init__(self, status: str, reason: str) -> None:
+        super().__init__(reason)
+        self.status, self.reason = status, reason
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a process ended that nobody stopped."""
+
+    status: str
+    reason: str
+
+
+class Confined:
+    """`python -P -m MODULE ARGUMENTS` under limits.
+
+    watch(until, deadline) waits; kill() ends it and everything it started; stderr is its last lines. `last_words` are
+    a signal it gets at its deadline, and the seconds it then has. Out of reach is what has left its process group and
+    lost its parent, too: a daemon.
+    """
+
+    def __init__(
+        self,
+        module: str,
+        arguments: Sequence[str],
+        limits: Limits,
+        *,
+        talkative: bool = False,
+        last_words: tuple[int, float] | None = STACK,
+        **popen: Any,
+    ) -> None:
+        self.limits = limits
+        self._oom_kills = _oom_kills()
+        self._killing, self._killed = threading.RLock(), False
+        self._talkative, self._stderr, self._last_words = talkative, bytearray(), last_words
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-m", module, *arguments],
+            env={**os.environ, **limits.environment},
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            **popen,
+        )
+        self._pump = threading.Thread(target=self._listen, args=(self.process.stderr,), daemon=True)
+        self._pump.start()
+
+    def watch(self, until: Callable[[float], bool], deadline: float) -> None:
+        """Return once `until(seconds)`, which waits so long at most, says so. Raises Killed at a limit, after killing.
+
+        `deadline` is on the clock time.monotonic.
+        """
+        while not until(max(0.0, min(TICK, deadline - time.monotonic()))):
+            taken = self._memory() if self.limits.memory is not None else 0
+            if self.limits.memory is not None and taken > self.limits.memory:
+                self.kill()
+                raise Killed("out-of-memory", f"{size(taken)} > {size(self.limits.memory)} of --memory")
+            if time.monotonic() >= deadline:
+                self._hear_out()
+                self.kill()
+                raise Killed("timeout", f"after {self.limits.timeout:g} s of --timeout")
+
+    def _hear_out(self) -> None:
+        if self._last_words is not None:
+            number, seconds = self._last_words
+            with suppress(OSError):
+                self.process.send_signal(number)
+            self.ended(seconds)
+
+    def ended(self, seconds: float) -> bool:
+        """Whether it has, within so many seconds."""
+        try:
+            self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    @property
+    def gone(self) -> bool:
+        """Whether it has ended, by now or long ago."""
+        return self.process.poll() is not None
+
+    def kill(self) -> None:
+        """SIGKILL to the whole group, and to what left it; once, for its number may be another's afterwards."""
+        with self._killing:
+            if self._killed:
+                return
+            strays = self._descendants()
+            with suppress(OSError):
+                if os.name == "posix":
+                    os.killpg(self.process.pid, signal.SIGKILL)
+                else:
+                    self.process.kill()
+            for stray in strays:
+                with suppress(psutil.Error):
+                    stray.kill()
+            self.process.wait()
+            self._killed = True
+        self._pump.join(1.0)
+
+    def ending(self) -> Ending:
+        """What became of a process that is ending without having said why: its exit code or signal, read."""
+        ended = self.ended(GRACE)
+        self.kill()  # what it started may still run
+        if not ended:
+            return Ending("crashed", f"it hung up and was still running {GRACE:g} s later")
+        code = self.process.wait()
+        if any(word in self._last_line() for word in EXHAUSTED) and code != -signal.SIGSEGV:
+            cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
+            return Ending("out-of-memory", f"an allocation failed within --memory{cap}: {self._last_line()}")
+        if code >= 0:
+            return Ending("crashed", f"its process ended with exit code {code}")
+        name = signal.Signals(-code).name if -code in {*signal.Signals} else f"signal {-code}"
+        if -code == signal.SIGKILL and _oom_kills() > self._oom_kills:
+            return Ending("out-of-memory", "killed by the system, which ran out of memory")
+        return Ending("crashed", f"its process was ended by {name}")
+
+    @property
+    def stderr(self) -> str:
+        """Its last lines so far."""
+        return "\n".join(bytes(self._stderr).decode(errors="backslashreplace").splitlines()[-LAST:])
+
+    def _last_line(self) -> str:
+        return next((line.strip() for line in reversed(without(self.stderr).splitlines()) if line.strip()), "")
+
+    def _listen(self, stream: IO[bytes]) -> None:
+        with suppress(OSError, ValueError), stream:
+            while piece := os.read(stream.fileno(), 65536):
+                self._stderr = (self._stderr + piece)[-KEPT:]
+                if self._talkative:
+                    with suppress(OSError, ValueError):  # nobody listens: it must go on being read all the same
+                        sys.stderr.write(piece.decode(errors="backslashreplace"))
+                        sys.stderr.flush()
+
+    def _descendants(self) -> list[psutil.Process]:
+        try:
+            return list(psutil.Process(self.process.pid).children(recursive=True))
+        except psutil.Error:
+            return []
+
+    def _memory(self) -> int:
+        """Resident bytes of the process and all it started."""
+        total = 0
+        for process in (psutil.Process(self.process.pid), *self._descendants()):
+            with suppress(psutil.Error):
+                total += process.memory_info().rss
+        return total
+
+
+def _oom_kills() -> int:
+    """How often this machine has killed for memory; 0 where it does not tell."""
+    try:
+        with open("/proc/vmstat") as file:
+            return next(int(line.split()[1]) for line in file if line.startswith("oom_kill "))
+    except (OSError, StopIteration):
+        return 0

@@ -1,0 +1,99 @@
+"""Who runs the cases of a sweep: options, and what does not go together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from gradient_routes.bench.command_options import Command, complain, refuse_given
+from gradient_routes.bench.execution.limited import pin
+from gradient_routes.problems.errors import InputError
+
+if TYPE_CHECKING:
+    from gradient_routes.bench.execution.isolation.limits import Limits
+    from gradient_routes.bench.execution.sweep import How
+
+    Executing = Callable[[bool, Limits, bool], How]  # isolate, limits, timed
+
+KINDS = ("local", "dask")
+EXECUTOR = "This machine, or a Dask cluster: one case at a time on each worker, on each host where they are timed."
+SCHEDULER = "Of the Dask cluster: tcp://HOST:8786. [a cluster of this machine]"
+WORKERS = "Of a Dask cluster of this machine. [one; with --no-timing one a processor]"
+JOBS = "Cases side by side; for --no-timing only, they are in each other's way."
+
+
+def executor_options(command: Command) -> Command:
+    """--executor, --scheduler, --workers, --jobs; the command gets how(isolate, limits, timed) as `executing`."""
+
+    @wraps(command)
+    def with_executor(
+        *, executor: Literal["local", "dask"], scheduler: str | None, workers: int | None, jobs: int, **others: Any
+    ) -> Any:
+        if executor == "local":
+            refuse_given(("scheduler", "workers"), "is of --executor dask")
+            return command(executing=lambda isolate, limits, timed: here(isolate, limits, timed, jobs), **others)
+        refuse_given(("jobs",), "is of --executor local, a Dask cluster has workers")
+        if scheduler is not None:
+            refuse_given(("workers",), "of a cluster of this machine, not of one at --scheduler")
+        return command(
+            executing=lambda isolate, limits, timed: by_dask(isolate, limits, timed, scheduler, workers), **others
+        )
+
+    options = (
+        click.option("--executor", type=click.Choice(KINDS), default="local", show_default=True, help=EXECUTOR),
+        click.option("--scheduler", metavar="ADDRESS", help=SCHEDULER),
+        click.option("--workers", type=int, metavar="N", help=WORKERS),
+        click.option("--jobs", type=int, default=1, show_default=True, help=JOBS),
+    )
+    decorated: Command = with_executor
+    for option in reversed(options):
+        decorated = option(decorated)
+    return decorated
+
+
+def here(isolate: bool, limits: Limits, timed: bool, jobs: int) -> How:
+    """On this machine. Raises InputError for what does not go together."""
+    from gradient_routes.bench.execution.sweep import How
+
+    if jobs < 1:
+        raise InputError(f"--jobs {jobs} - give 1 or more")
+    if jobs > 1 and timed:
+        raise InputError(f"--jobs {jobs}: cases side by side spoil each other's timing - add --no-timing")
+    if jobs > 1 and not isolate:
+        raise InputError(f"--jobs {jobs}: needs processes - drop --no-isolate")
+    if not isolate:
+        pin(limits)
+    return How(isolate, limits, jobs)
+
+
+def by_dask(isolate: bool, limits: Limits, timed: bool, scheduler: str | None, workers: int | None) -> How:
+    """On a cluster, which is joined or started when there is a first case. Raises InputError."""
+    from gradient_routes.bench.execution.sweep import How
+
+    if not isolate:
+        raise InputError("--executor dask: cases on its workers run in processes of their own - drop --no-isolate")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers} - give 1 or more")
+    if workers is not None and workers > 1 and timed:
+        raise InputError(f"--workers {workers}: cases side by side spoil each other's timing - add --no-timing")
+    try:
+        from gradient_routes.bench.execution.cluster.cluster import Cluster
+        from gradient_routes.bench.execution.cluster.joining import joined, local
+    except ImportError as error:
+        raise InputError(f"--executor dask: {error} - pip install 'gradient-routes[dask]'") from error
+    if scheduler is not None:
+        cluster = Cluster(lambda: joined(scheduler), timed, complain)
+    else:
+        count = workers or (1 if timed else max(1, processors() // limits.threads))
+        cluster = Cluster(lambda: local(count), timed, complain)
+    click.get_current_context().call_on_close(cluster.close)  # however the run ends
+    return How(isolate, limits, cluster=cluster)
+
+
+def processors() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

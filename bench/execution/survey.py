@@ -1,0 +1,50 @@
+"""How large problems are, and which cannot be built as asked: known before anything is measured."""
+
+from __future__ import annotations
+
+from gradient_routes.bench.cases.case import ProblemSpec, sized
+from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
+from gradient_routes.bench.cases.outcome import FOREIGN, bare
+from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.execution.executors.isolated import Line
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.process import Killed
+from gradient_routes.bench.execution.pruning import Size
+from gradient_routes.bench.execution.worker import Survey
+from gradient_routes.problems.errors import DomainError, InputError, RoutesError
+
+
+def sizes(problems: list[ProblemSpec], settings: Settings, limits: Limits | None) -> list[Size | None]:
+    """n_u and n_p of every problem, in a process of its own under `limits` or, where None, in this one; None for one
+    whose code fails: each of its cases will tell. Raises InputError, DomainError.
+    """
+    if limits is None:
+        return [_understood(surveyed(problem, settings.at)) for problem in problems]
+    found: list[Size | None] = []
+    while len(found) < len(problems):
+        line = Line(Survey(problems[len(found) :], settings), limits)
+        try:
+            while len(found) < len(problems):
+                found.append(_understood(line.hear()[1]))
+        except (EOFError, Killed):
+            found.append(None)  # the one that it ended at
+        finally:
+            line.close()
+    return found
+
+
+def surveyed(problem: ProblemSpec, at: str) -> Size | RoutesError | None:
+    """The size of one problem, the error of one that refuses what it is given, None for one that fails."""
+    try:
+        with stdout_to_stderr():
+            return sized(problem, at)
+    except (InputError, DomainError) as error:
+        return bare(error)
+    except FOREIGN:
+        return None
+
+
+def _understood(what: Size | RoutesError | None) -> Size | None:
+    if isinstance(what, RoutesError):
+        raise what
+    return what

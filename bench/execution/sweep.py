@@ -1,0 +1,155 @@
+"""Sweeps: all pairs of problems and routes become cases, cases become rows. A failure is a row, too."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.keys import identified, witnesses
+from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.measurement import begun_row
+from gradient_routes.bench.execution.pruning import Pruning, Size
+from gradient_routes.bench.execution.references import Found
+from gradient_routes.bench.execution.survey import sizes
+from gradient_routes.bench.execution.worker import Measure
+
+
+@dataclass(frozen=True)
+class How:
+    """Where cases run: in processes of their own under limits, or here; so many at once; by a Dask cluster."""
+
+    isolate: bool = True
+    limits: Limits = field(default_factory=Limits)
+    jobs: int = 1
+    cluster: Any = None
+
+    @property
+    def row(self) -> Row:
+        """The columns that tell of it."""
+        return {
+            "isolated": int(self.isolate),
+            "threads": self.limits.threads,
+            "timeout_s": self.limits.timeout if self.isolate and math.isfinite(self.limits.timeout) else None,
+            "memory_cap_bytes": self.limits.memory if self.isolate else None,
+        }
+
+
+HERE = How(isolate=False)
+
+
+def everything(row: Row) -> bool:
+    """Every case is wanted."""
+    return True
+
+
+def run(
+    problems: list[ProblemSpec],
+    routes: list[RouteSpec],
+    settings: Settings,
+    how: How = HERE,
+    wanted: Callable[[Row], bool] = everything,
+) -> Generator[Outcome]:
+    """All pairs that are wanted, problem by problem; each outcome as soon as it is known.
+
+    InputError and DomainError for problems that cannot be come before anything is measured.
+    """
+    return Sweep(problems, routes, settings, how, wanted).outcomes()
+
+
+class Sweep:
+    """Cases, and what is known of them before and between."""
+
+    def __init__(
+        self,
+        problems: list[ProblemSpec],
+        routes: list[RouteSpec],
+        settings: Settings,
+        how: How,
+        wanted: Callable[[Row], bool],
+    ) -> None:
+        self.routes, self.settings, self.how, self.wanted = routes, settings, how, wanted
+        self.problems = [p for p in problems if any(wanted(self._row(p, route)) for route in routes)]
+        guarded = how.limits if how.isolate else None
+        alone = len(self.problems) == 1
+        self.sizes: list[Size | None] = [None] if alone else sizes(self.problems, settings, guarded)
+        self.pruning = Pruning()
+        self._places = itertools.count()
+        self._started: dict[str, tuple[int, Measure, Size | None]] = {}
+
+    def outcomes(self) -> Generator[Outcome]:
+        """Raises the refusal of a case that is refused before any other has an outcome."""
+        begun = False
+        for outcome in self._outcomes():
+            if outcome.refusal is not None and not begun:
+                raise outcome.refusal
+            begun = True
+            yield outcome
+
+    def _outcomes(self) -> Iterator[Outcome]:
+        for outcome in self._side_by_side() if self.how.jobs > 1 or self.how.cluster else self._one_by_one():
+            place, job, size = self._started.pop(outcome.row["case_key"])
+            self.pruning.note(job.problem, job.route, size, outcome.row)
+            yield replace(outcome, place=place)
+
+    def _one_by_one(self) -> Iterator[Outcome]:
+        for problem, size in zip(self.problems, self.sizes, strict=True):
+            pruned: list[Outcome] = []
+            jobs = list(self._jobs([(problem, size)], pruned))
+            yield from pruned
+            if jobs:
+                yield from self._group(jobs)
+
+    def _group(self, jobs: list[Measure]) -> Iterator[Outcome]:
+        """The routes on one problem, timed in turn."""
+        if not self.how.isolate:
+            from gradient_routes.bench.execution.executors.in_process import outcomes
+
+            return outcomes(jobs)
+        from gradient_routes.bench.execution.executors.isolated import Isolated
+        from gradient_routes.bench.execution.executors.running import interleaved
+
+        return interleaved(Isolated(job, self.how.limits) for job in jobs)
+
+    def _side_by_side(self) -> Iterator[Outcome]:
+        from gradient_routes.bench.execution.executors import pool
+
+        pruned: list[Outcome] = []
+        jobs = self._jobs(zip(self.problems, self.sizes, strict=True), pruned)
+        run = self.how.cluster.outcomes if self.how.cluster is not None else pool.outcomes
+        for outcome in run(jobs, self.how.jobs, self.how.limits):
+            yield outcome
+            while pruned:
+                yield pruned.pop(0)
+        yield from pruned
+
+    def _jobs(self, problems: Iterable[tuple[ProblemSpec, Size | None]], pruned: list[Outcome]) -> Iterator[Measure]:
+        """What is wanted; what is not worth trying goes among the pruned."""
+        for problem, size in problems:
+            found: Found = {}
+            for route in self.routes:
+                known = witnesses(problem, route, self.settings.at)
+                job = Measure(problem, route, self.settings, self._row(problem, route), found, known)
+                if not self.wanted(job.row):
+                    continue
+                self._started[job.row["case_key"]] = next(self._places), job, size
+                reason = self.pruning.reason(problem, route, size)
+                if reason is None:
+                    yield job
+                else:
+                    n_u, n_p = size or (None, None)
+                    row = job.row | {"status": "pruned", "reason": reason, "n_state": n_u, "n_param": n_p}
+                    pruned.append(Outcome(row))
+
+    def _row(self, problem: ProblemSpec, route: RouteSpec) -> Row:
+        """What is known before it is run."""
+        budget = self.settings.budget
+        row = begun_row(problem, route, self.settings) | self.how.row
+        row |= {"budget_s": budget if math.isfinite(budget) else None}
+        return identified(row, problem, route, self.settings, self.how.limits.threads)

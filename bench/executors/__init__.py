@@ -1,1 +1,0 @@
-"""Where cases run: in this process, in processes of their own, on other machines."""

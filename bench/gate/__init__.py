@@ -1,1 +1,0 @@
-"""The gate: what was measured now against what was measured before, a rule for every metric."""

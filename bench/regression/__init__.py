@@ -1,0 +1,1 @@
+"""Regression gate: new measurements against a committed baseline, one rule per metric."""

@@ -1,0 +1,122 @@
+"""What is compared: the latest row of every case, its rounds as ratios to a forward solve, the latest verdicts."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gradient_routes.bench.cases.environment import Environment
+from gradient_routes.bench.cases.row import ENVIRONMENTS, Row, from_record
+from gradient_routes.bench.store.store import Store
+from gradient_routes.problems.errors import InputError
+
+NAMES = ("problem", "problem_options", "route", "route_options", "at", "partial")
+NUMBERS = ("work", "gradient_error", "seconds", "peak_bytes", "tape_bytes", "factor_bytes", "predicted_s")
+HOW = ("reference", "memory_method", "unstable", "isolated", "threads", "budget_s")
+KEPT = ("case_key", *NAMES, "settings", "status", "reason", *NUMBERS, *HOW)
+
+
+@dataclass(frozen=True)
+class Case:
+    """The columns KEPT of a row, where it was measured, and its time.
+
+    ratios   seconds of the gradient / of a forward solve, round by round
+    fastest  the same of the fastest of each, whose rounds may differ
+    """
+
+    row: Row
+    environment: Environment
+    ratios: tuple[float, ...] = ()
+    fastest: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The same for the same problem and route with the same options, as far as the row tells."""
+        return json.dumps([self.row[name] for name in NAMES], sort_keys=True)
+
+    @property
+    def key(self) -> str:
+        """The key of what was asked; rows of older versions have none."""
+        return self.row["case_key"] or self.name
+
+    @property
+    def ok(self) -> bool:
+        return bool(self.row["status"] == "ok")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check said of a route, or of other people's code, at p."""
+
+    problem: str
+    route: str | None
+    at: str
+    verdict: str
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        return self.problem, self.route or "", self.at
+
+    @property
+    def case(self) -> Row:
+        """As findings name it; the selectors hold the options."""
+        return {"problem": self.problem, "route": self.route or "", "at": self.at}
+
+
+@dataclass(frozen=True)
+class Measured:
+    """All that one side of a comparison holds; `source` names it."""
+
+    source: str
+    cases: tuple[Case, ...]
+    verdicts: tuple[Verdict, ...]
+
+
+def of_store(store: Store) -> Measured:
+    """The latest of everything in a store. Raises InputError where it holds neither a case nor a verdict."""
+    cases, verdicts = _cases(store), _verdicts(store)
+    if not cases and not verdicts:
+        raise InputError(f"store {store.path}: holds no case and no verdict - run `routes run` first, or name another")
+    return Measured(str(store.path), tuple(cases), tuple(verdicts))
+
+
+def _cases(store: Store) -> list[Case]:
+    environments, latest = _environments(store), {}
+    for record in store.records("cases"):
+        row = from_record(record)
+        case = Case({name: row[name] for name in KEPT}, environments.get(record["environment_id"], {}))
+        latest[case.key] = record["case_id"], case
+    times = _times(store, {case_id for case_id, _ in latest.values()})
+    return [Case(case.row, case.environment, *times.get(case_id, ())) for case_id, case in latest.values()]
+
+
+def _environments(store: Store) -> Mapping[str, Environment]:
+    return {
+        record["environment_id"]: {column.name: record[column.name] for column in ENVIRONMENTS[1:]}
+        for record in store.records("environments")
+    }
+
+
+def _times(store: Store, of: set[int]) -> dict[int, tuple[tuple[float, ...], float]]:
+    """By case_id, ratios and that of the fastest; gradient and forward solve of one round are neighbours in time."""
+    seconds: defaultdict[int, dict[str, dict[int, float]]] = defaultdict(lambda: {"gradient": {}, "forward": {}})
+    names, records = store.table("samples")
+    case, kind, of_round, value = (names.index(name) for name in ("case_id", "kind", "round", "seconds"))
+    for record in records:
+        if record[case] in of and record[value] > 0:
+            seconds[record[case]][record[kind]][record[of_round]] = record[value]
+    return {
+        case_id: (tuple(g / f[i] for i, g in gs.items() if i in f), min(gs.values()) / min(f.values()))
+        for case_id, (gs, f) in ((case_id, by.values()) for case_id, by in seconds.items())
+        if gs and f
+    }
+
+
+def _verdicts(store: Store) -> list[Verdict]:
+    latest = {}
+    for record in store.records("checks"):
+        verdict = Verdict(record["problem"], record["route"], record["at"], record["verdict"])
+        latest[verdict.key] = verdict
+    return list(latest.values())

@@ -1,0 +1,133 @@
+"""A comparison for a person: every case before and now, then what is worse, better or not compared, in sentences."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.execution.cost_model import summary
+from gradient_routes.bench.regression.compare import Comparison
+from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding, Judgement
+from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
+from gradient_routes.bench.render.terminal.tables import RESOLUTION, named, show, titled
+from gradient_routes.routes.tally import Work
+
+METRICS = {
+    "status": "status",
+    "work": "work",
+    "gradient_error": "error",
+    "peak_bytes": "memory",
+    "tape_bytes": "tape",
+    "time": "x fwd",
+    "seconds": "seconds",
+}
+LEGEND = "before -> now; seconds are shown, never judged: time is judged in forward solves of the same run (x fwd)"
+STYLES: dict[Judgement, str] = {"worse": "bold red", "better": "green", "not-compared": "dim"}
+FEW = 3  # cases that a line names
+
+
+def show_comparison(out: Console, comparison: Comparison) -> None:
+    """The table of cases, then the sentences, the conclusion last."""
+    cases = overview(comparison)
+    if cases:
+        show(out, _table(cases))
+        out.print(Text(LEGEND, style="dim"), soft_wrap=True)
+    for judgement, line in lines(comparison):
+        out.print(Text(line, style=STYLES.get(judgement, "")), soft_wrap=True)
+    for note in comparison.notes:
+        out.print(Text(f"note: {note}", style="italic"), soft_wrap=True)
+    style = "bold red" if comparison.worse else "bold green"
+    out.print(Text(conclusion(comparison), style=style), soft_wrap=True)
+
+
+def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column("problem\n  route", overflow="fold", min_width=14)
+    for heading in METRICS.values():
+        table.add_column(heading, overflow="fold", min_width=7)
+    before = None
+    for problem, route, by_metric in cases:
+        if problem != before:
+            table.add_row(Text(problem, style="bold"))
+            before = problem
+        cells = (Text(*cell(by_metric.get(metric), metric)) for metric in METRICS)
+        table.add_row(Text(f"  {route}"), *cells)
+    return table
+
+
+def overview(comparison: Comparison) -> list[tuple[str, str, dict[str, Finding]]]:
+    """Problem, route and findings by metric of every case of both."""
+    grouped: defaultdict[int, dict[str, Finding]] = defaultdict(dict)
+    for finding in comparison.findings:
+        if finding.metric in METRICS:
+            grouped[id(finding.case)][finding.metric] = finding
+    cases = (next(iter(by_metric.values())).case for by_metric in grouped.values())
+    return [(*names(case), by_metric) for case, by_metric in zip(cases, grouped.values(), strict=True)]
+
+
+def names(case: Row) -> tuple[str, str]:
+    """Problem and route as selectors; those of a verdict are already."""
+    if "problem_options" not in case:
+        return case["problem"], case["route"]
+    return titled(case), named("route", case)
+
+
+def cell(finding: Finding | None, metric: str) -> tuple[str, str]:
+    """`before -> now`, or once what is the same, and its style."""
+    if finding is None:
+        return "", ""
+    before, now = (_value(metric, value) for value in (finding.base, finding.new))
+    style = STYLES.get(finding.judgement, "dim" if metric == "seconds" else "")
+    return now if before == now else f"{before or '?'} -> {now or '?'}", style
+
+
+def _value(metric: str, value: Any) -> str:
+    if value is None:
+        return ""
+    if metric == "work":
+        return summary(Work(**value))
+    if metric.endswith("_bytes"):
+        return bytes_(value, RESOLUTION if metric == "peak_bytes" else 0)
+    if metric == "gradient_error":
+        return number(value, 2)
+    return {"time": ratio, "seconds": seconds}.get(metric, str)(value)
+
+
+def lines(comparison: Comparison) -> Iterator[tuple[Judgement, str]]:
+    """A sentence a finding, the worse ones first; cases of which the same is to be said share one."""
+    for judgement in JUDGEMENTS:
+        shared: defaultdict[str, list[Finding]] = defaultdict(list)
+        for finding in comparison.findings:
+            if finding.judgement == judgement and finding.says:
+                shared[finding.says].append(finding)
+        for says, findings in shared.items():
+            yield judgement, f"{judgement.replace('-', ' ')}: {_whose(findings)}: {says}"
+
+
+def _whose(findings: Sequence[Finding]) -> str:
+    if len(findings) > FEW and findings[0].judgement != "worse":
+        return f"{len(findings)} cases"
+    whose = (names(finding.case) for finding in findings)
+    return ", ".join(f"{route} on {problem}" if route else problem for problem, route in whose)
+
+
+def conclusion(comparison: Comparison) -> str:
+    """How many cases are compared and by what, findings of each kind, and whether they make a regression."""
+    verdicts = sum(finding.metric == "verdict" for finding in comparison.findings)
+    compared = [_cases(comparison)] if comparison.by_numbers or comparison.by_status else []
+    compared += [f"{verdicts} verdict{'s' if verdicts > 1 else ''}"] if verdicts else []
+    counts = {j: comparison.count(j) for j in ("worse", "better")}
+    said = ", ".join(f"{n} {judgement}" for judgement, n in counts.items() if n)
+    word = "a regression" if comparison.worse else "no regression"
+    return f"{word}: {' and '.join(compared)}, {said or 'nothing better or worse'}"
+
+
+def _cases(comparison: Comparison) -> str:
+    numbers, status = comparison.by_numbers, comparison.by_status
+    return f"{numbers} case{'' if numbers == 1 else 's'} compared by numbers, {status} by status only"

@@ -1,0 +1,1 @@
+"""Tables, figures and reports from rows. Nothing is measured here."""

@@ -1,0 +1,146 @@
+"""What a report is made of: the newest row of every case, the newest study of everything that was asked."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+from gradient_routes.bench.cases.registry import Kind
+from gradient_routes.bench.cases.row import COLUMNS, Column, Row, from_record
+from gradient_routes.bench.render.terminal import tables
+from gradient_routes.bench.render.terminal.tables import asked
+from gradient_routes.bench.store.store import TABLES, Store
+from gradient_routes.bench.studies.columns import STUDIES
+
+# what one line, or one panel, of a figure is about: the columns that name it, for the newest study of it
+ASKED: dict[str, tuple[str, ...]] = {
+    "checks": ("problem", "route", "at"),
+    "points": ("problem", "route", "at"),
+    "tolerance": ("problem", "problem_options", "at", "linear_solver", "sweep", "route"),
+    "unrolling": ("problem", "problem_options", "at", "inner", "checkpoint"),
+    "unrolling_fits": ("problem", "problem_options", "at", "inner", "checkpoint"),
+    "kink": ("problem", "at"),
+    "scaling_fits": ("problem", "problem_options", "at", "route", "route_options", "quantity", "against"),
+    "break_even": ("problem", "problem_options", "at", "route", "route_options", "other", "other_options"),
+    "inversion": ("problem", "problem_options", "at", "route", "route_options", "optimizer", "alpha"),
+    "estimates": ("problem", "problem_options", "at", "route", "route_options", "optimizer", "alpha"),
+    "lcurve": ("problem", "problem_options", "at", "route", "route_options", "optimizer"),
+    "tradeoff": ("problem", "problem_options", "at", "route", "route_options", "optimizer"),
+    "spectrum": ("experiment", "at"),
+    "identified": ("experiment", "at"),
+    "experiments": ("experiment", "at"),
+    "placement": ("experiment", "at", "criterion"),
+}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Rows by table, as objects; `kept` counts all cases of the store, the newest of which are `cases`."""
+
+    cases: list[Row] = field(default_factory=list)
+    kept: int = 0
+    environments: list[Row] = field(default_factory=list)
+    studies: list[Row] = field(default_factory=list)
+    tables: dict[str, list[Row]] = field(default_factory=dict)
+    name: str = ""
+
+    def table(self, name: str) -> list[Row]:
+        """The rows of a study's table; none where this store has no such table."""
+        return self.tables.get(name, [])
+
+    @property
+    def answered(self) -> list[Row]:
+        return [row for row in self.cases if row["status"] == "ok"]
+
+
+def read(store: Store) -> Source:
+    """Everything a report shows. Raises InputError where there is no store."""
+    cases = cases_of(store)
+    found = {name: newest(store.records(name), ASKED.get(name, ("problem", "route"))) for name in STUDIES}
+    named = {name: [_named(row, STUDIES[name]) for row in rows] for name, rows in found.items()}
+    return Source(
+        cases=latest(cases),
+        kept=len(cases),
+        environments=store.records("environments"),
+        studies=store.records("studies"),
+        tables=named,
+        name=store.path.name,
+    )
+
+
+def cases_of(store: Store) -> list[Row]:
+    """The cases, with the numbers of their rows and of their environments."""
+    return [
+        from_record(row) | {key: row[key] for key in ("case_id", "environment_id")} for row in store.records("cases")
+    ]
+
+
+def latest(cases: Sequence[Row]) -> list[Row]:
+    """The newest row of every case, in the order in which cases were first seen.
+
+    `problem` and `route` become selectors, `family` and `by` keep the bare names.
+    """
+    newest: dict[str, Row] = {}
+    for row in cases:
+        newest[row["case_key"] or _unkeyed(row)] = row
+    known: dict[str, str] = {}
+
+    def problem(row: Row) -> str:
+        key = json.dumps([row[name] for name in ("problem", *ASKING)])
+        if key not in known:
+            known[key] = asked(row)
+        return known[key]
+
+    return [
+        row
+        | {"family": row["problem"], "problem": problem(row)}
+        | {"by": row["route"], "route": selector("route", row["route"], row["route_options"])}
+        for row in newest.values()
+    ]
+
+
+ASKING = ("problem_options", "settings", "at", "partial")
+
+
+def _unkeyed(row: Row) -> str:
+    """Of a store older than keys."""
+    return json.dumps([row[name] for name in ("problem", *ASKING, "route", "route_options")], sort_keys=True)
+
+
+def newest(rows: Sequence[Row], columns: Sequence[str]) -> list[Row]:
+    """The rows of the newest study of each thing asked."""
+    keys = [json.dumps([row.get(column) for column in columns], sort_keys=True) for row in rows]
+    last: dict[str, int] = {}
+    for key, row in zip(keys, rows, strict=True):
+        last[key] = max(last.get(key, 0), row["study_id"])
+    return [row for key, row in zip(keys, rows, strict=True) if row["study_id"] == last[key]]
+
+
+def _named(row: Row, columns: Sequence[Column]) -> Row:
+    """Problem and route by their selectors, where the table has names and options apart."""
+    names = {column.name for column in columns}
+    given = {"problem": row.get("problem"), "route": row.get("route")}
+    for kind in ("problem", "route"):
+        if f"{kind}_options" in names:
+            given[kind] = selector(kind, row[kind], row[f"{kind}_options"])
+    if "other_options" in names:
+        given["other"] = selector("route", row["other"], row["other_options"])
+    return row | given
+
+
+def selector(kind: Kind, name: str | None, options: Row | None) -> str:
+    """What names a problem or route with these options, its defaults left out."""
+    return "" if name is None else _selector(kind, name, json.dumps(options or {}))
+
+
+@cache
+def _selector(kind: Kind, name: str, options: str) -> str:
+    return tables.named(kind, {kind: name, f"{kind}_options": json.loads(options)})
+
+
+def schema(table: str) -> dict[str, Column]:
+    """Columns of a table by name."""
+    columns = COLUMNS if table == "cases" else STUDIES.get(table, ())
+    return {column.name: column for column in columns} | {column.name: column for column in TABLES.get(table, ())}

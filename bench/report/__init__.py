@@ -1,1 +1,0 @@
-"""The report of a store: figures declared once, drawn by a page, by Markdown and by Matplotlib."""

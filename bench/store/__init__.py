@@ -1,0 +1,1 @@
+"""The store: results in SQLite, append-only, exported and resumed from."""

@@ -1,0 +1,37 @@
+"""What of a sweep is still to be done: a store's latest row of every case against what the case is now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.store.store import Store
+
+State = Literal["missing", "failed", "stale", "done"]
+OPEN: tuple[State, ...] = ("missing", "failed", "stale")
+
+
+def state_of(row: Row, kept: Row | None, expected: Callable[[Row], bool] = lambda row: False) -> State:
+    """Of a case whose latest row is `kept`, None for none.
+
+    A skipped case waits for a larger budget, a pruned one for the smaller case to be tried again. One that failed as
+    it was expected to is done.
+    """
+    if kept is None or kept["status"] == "pruned":
+        return "missing"
+    if kept["content_key"] != row["content_key"]:
+        return "stale"
+    if kept["status"] == "skipped":
+        more = kept["budget_s"] is not None and (row["budget_s"] is None or row["budget_s"] > kept["budget_s"])
+        return "missing" if more else "done"
+    return "done" if kept["status"] == "ok" or expected(kept) else "failed"
+
+
+def still_open(store: Store, states: tuple[State, ...], expected: Callable[[Row], bool]) -> Callable[[Row], bool]:
+    """Whether a case is in one of `states`: asked when its turn comes, for another runner may have done it."""
+
+    def wanted(row: Row) -> bool:
+        return state_of(row, store.latest(row["case_key"]).get(row["case_key"]), expected) in states
+
+    return wanted

@@ -1,0 +1,51 @@
+"""Where a store stands: the newest row of every case, and whether what it rests on is still the same."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from gradient_routes.bench.cases.case import problem_named, route_named
+from gradient_routes.bench.cases.keys import content_key
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.store.store import Store
+from gradient_routes.problems.errors import InputError
+
+STALE, GONE = "stale", "gone"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A case: its newest row, and stale or gone where the code it came from has changed or is no longer there."""
+
+    row: Row
+    aged: str | None
+
+    @property
+    def word(self) -> str:
+        """Its status, and what became of it."""
+        return self.row["status"] if self.aged is None else f"{self.row['status']} ({self.aged})"
+
+
+def standings(store: Store) -> list[Standing]:
+    """Of all cases, oldest first. Raises InputError where there is no store or none with keys."""
+    rows = list(store.latest().values())
+    if not rows:
+        store.rows()  # says so where there is no store
+        raise InputError(f"store {store.path}: holds no case with a key - run `routes run` first, or name another")
+    return [Standing(row, _aged(row)) for row in rows]
+
+
+def _aged(row: Row) -> str | None:
+    try:
+        problem = problem_named(row["problem"], row["problem_options"])
+        route = route_named(row["route"], row["route_options"])
+        now = content_key(row["case_key"], problem, route, row["at"])
+    except (InputError, OSError):
+        return GONE
+    return None if now == row["content_key"] else STALE
+
+
+def counts(standing: list[Standing]) -> str:
+    """`5 ok, 2 skipped, 1 timeout (stale)`."""
+    return ", ".join(f"{number} {word}" for word, number in Counter(s.word for s in standing).most_common())

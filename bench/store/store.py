@@ -1,0 +1,242 @@
+"""Every run is kept: an append-only SQLite file with the tables cases, samples, environments and those of studies.
+
+One case, or one study, is one transaction, so a process killed at any moment loses at most the one in flight; writers
+wait for each other.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from gradient_routes.bench.cases.environment import Environment, environment, fingerprint
+from gradient_routes.bench.cases.row import (
+    ENVIRONMENTS,
+    KEYS,
+    SAMPLES,
+    STORED,
+    Column,
+    Row,
+    as_record,
+    from_record,
+    stored,
+)
+from gradient_routes.bench.cases.samples import Samples
+from gradient_routes.bench.studies.columns import KEY, STUDIES, STUDY
+from gradient_routes.bench.units import now
+from gradient_routes.problems.errors import InputError
+
+APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
+SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: scaling, inversion, identifiability
+PATIENCE = 60.0  # [s] to wait for another writer
+TABLES: dict[str, tuple[Column, ...]] = {
+    "cases": (KEYS[0], KEYS[1], *STORED),
+    "samples": SAMPLES,
+    "environments": ENVIRONMENTS,
+    "studies": STUDY,
+    **{name: (KEY, *columns) for name, columns in STUDIES.items()},
+}
+
+
+class Store:
+    """A store on disk. `append` keeps a row, `table` gives one back. Every call opens the file and closes it."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+
+    def check_writable(self) -> None:
+        """Raise InputError now rather than after the first case. What is not there yet is not made."""
+        with self._errors():
+            self._refuse_folder()
+            try:
+                os.stat(self.path)
+            except FileNotFoundError:
+                there = next(folder for folder in self.path.absolute().parents if folder.exists())
+                tempfile.TemporaryFile(dir=there).close()
+                return
+        with self._transaction():
+            pass
+
+    def _refuse_folder(self) -> None:
+        if self.path.is_dir():
+            raise InputError(f"store {self.path}: is a directory - name a file in it: {self.path}/routes.sqlite")
+
+    def append(self, row: Row, samples: Samples | None, measured_in: Environment | None = None) -> None:
+        """Keep a row and its raw timings, all or nothing, and the environment of its process, this one's if None."""
+        self.append_all([(row, samples, measured_in)])
+
+    def append_all(self, cases: Iterable[tuple[Row, Samples | None, Environment | None]]) -> None:
+        """Many at once, all or nothing: the disk is waited for once, which is what a row costs."""
+        names = ", ".join(["environment_id", *(c.name for c in STORED)])
+        marks = ", ".join("?" * (1 + len(STORED)))
+        with self._transaction() as db:
+            for row, samples, measured_in in cases:
+                values = (self._environment_id(db, measured_in), *as_record(row))
+                case_id = db.execute(f"INSERT INTO cases ({names}) VALUES ({marks})", values).lastrowid
+                if samples is not None:
+                    kinds = (("gradient", samples.gradient), ("forward", samples.forward))
+                    timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
+                    db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
+
+    def append_study(self, tables: Mapping[str, Sequence[Row]], started: str) -> int:
+        """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""
+        with self._transaction() as db:
+            values = (next(iter(tables)), self._environment_id(db), started, "ok")
+            names = "study, environment_id, started, status"
+            cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?)", values)
+            study_id = int(cursor.lastrowid or 0)
+            for name, rows in tables.items():
+                columns = STUDIES[name]
+                marks = ", ".join("?" * (1 + len(columns)))
+                names = ", ".join(c.name for c in (KEY, *columns))
+                records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in rows]
+                db.executemany(f"INSERT INTO {name} ({names}) VALUES ({marks})", records)
+            return study_id
+
+    def append_ended(self, study: str, status: str, reason: str, stderr: str) -> None:
+        """Keep that a study was ended before it was done."""
+        with self._transaction() as db:
+            values = (study, self._environment_id(db), now(), status, reason, stderr)
+            names = "study, environment_id, started, status, reason, stderr"
+            db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
+
+    def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
+        with self._reading() as db:
+            if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
+                return [c.name for c in TABLES[name]], []  # a store of an older schema
+            cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
+            return [d[0] for d in cursor.description], cursor.fetchall()
+
+    def records(self, name: str) -> list[Row]:
+        """The rows of a table by column, objects parsed, columns of a newer schema absent. Raises InputError where a
+        value is not what its column holds.
+        """
+        names, values = self.table(name)
+        return [self._parsed(name, dict(zip(names, record, strict=True))) for record in values]
+
+    def _parsed(self, table: str, record: Row) -> Row:
+        row: Row = dict.fromkeys(column.name for column in TABLES[table]) | record
+        for column in TABLES[table]:
+            value = row[column.name]
+            if column.json and value is not None:
+                try:
+                    row[column.name] = json.loads(value)
+                except (ValueError, TypeError, RecursionError) as error:
+                    key, number = next(iter(record.items()))
+                    where = f"{table}, {key} {number}, {column.name}"
+                    raise InputError(
+                        f"store {self.path}: {where}: no JSON ({error}) - delete that row, or name another store"
+                    ) from error
+        return row
+
+    def rows(self) -> list[Row]:
+        """The cases as rows again."""
+        return [from_record(record) for record in self.records("cases")]
+
+    def latest(self, case_key: str | None = None) -> dict[str, Row]:
+        """The newest row of every case by its case_key, or of the one given; none where there is no store yet."""
+        if not self.path.is_file() or self.path.stat().st_size == 0:
+            return {}
+        one = "" if case_key is None else "AND case_key = :case_key"
+        newest = f"SELECT max(case_id) FROM cases WHERE case_key NOT NULL {one} GROUP BY case_key"
+        with self._reading() as db:
+            if "case_key" not in {column[1] for column in db.execute("PRAGMA table_info(cases)")}:
+                return {}  # of an older schema
+            cursor = db.execute(f"SELECT * FROM cases WHERE case_id IN ({newest})", {"case_key": case_key})
+            names = [d[0] for d in cursor.description]
+            records = [dict(zip(names, record, strict=True)) for record in cursor]
+        rows = [from_record(self._parsed("cases", record)) for record in records]
+        return {row["case_key"]: row for row in rows}
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        with self._errors():
+            if not self.path.is_file():
+                raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
+            with closing(sqlite3.connect(self._uri("rw"), uri=True, timeout=PATIENCE)) as db:
+                if not self._has_tables(db):
+                    raise InputError(f"store {self.path}: is empty - run `routes run` first, or name another")
+                self._check_kind(db)
+                yield db
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        with self._errors():
+            self._refuse_folder()
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with closing(sqlite3.connect(self._uri("rwc"), uri=True, timeout=PATIENCE, isolation_level=None)) as db:
+                db.execute("BEGIN IMMEDIATE")
+                if self._has_tables(db):
+                    self._check_kind(db)
+                    self._migrate(db)
+                else:
+                    self._create(db)
+                yield db
+                db.execute("COMMIT")  # an exception before this leaves the file as it was
+
+    def _uri(self, mode: str) -> str:
+        return f"{self.path.absolute().as_uri()}?mode={mode}"
+
+    @staticmethod
+    def _has_tables(db: sqlite3.Connection) -> bool:
+        return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+
+    def _create(self, db: sqlite3.Connection) -> None:
+        if db.execute("PRAGMA application_id").fetchone()[0] != 0:
+            self._check_kind(db)
+        self._create_tables(db)
+        db.execute(f"PRAGMA application_id = {APPLICATION}")
+        db.execute(f"PRAGMA user_version = {SCHEMA}")
+
+    @staticmethod
+    def _create_tables(db: sqlite3.Connection) -> None:
+        """Those that are not there yet."""
+        for name, columns in TABLES.items():
+            db.execute(f"CREATE TABLE IF NOT EXISTS {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
+        db.execute("CREATE INDEX IF NOT EXISTS by_case ON cases (case_key)")
+
+    def _migrate(self, db: sqlite3.Connection) -> None:
+        """What an older schema lacks is added, absent in its rows."""
+        if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
+            for name, columns in TABLES.items():
+                there = {column[1] for column in db.execute(f"PRAGMA table_info({name})")}
+                for column in columns:
+                    if there and column.name not in there:
+                        db.execute(f"ALTER TABLE {name} ADD COLUMN {column.name} {column.type}")
+            self._create_tables(db)
+            db.execute(f"PRAGMA user_version = {SCHEMA}")
+
+    def _check_kind(self, db: sqlite3.Connection) -> None:
+        if db.execute("PRAGMA application_id").fetchone()[0] != APPLICATION:
+            raise InputError(f"store {self.path}: is a database of another program - name another file with --store")
+        schema = db.execute("PRAGMA user_version").fetchone()[0]
+        if not 1 <= schema <= SCHEMA:
+            raise InputError(
+                f"store {self.path}: has schema {schema}, this version knows 1 to {SCHEMA} - name another file"
+            )
+
+    @staticmethod
+    def _environment_id(db: sqlite3.Connection, measured_in: Environment | None = None) -> str:
+        here = measured_in or environment()
+        values = [json.dumps(here[c.name]) if c.json else here[c.name] for c in ENVIRONMENTS[1:]]
+        marks = ", ".join("?" * len(ENVIRONMENTS))
+        key = fingerprint(here)
+        db.execute(f"INSERT OR IGNORE INTO environments VALUES ({marks})", (key, *values))
+        return key
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """SQLite's and the system's complaints as one line."""
+        try:
+            yield
+        except (sqlite3.Error, OSError) as error:
+            what = error.strerror if isinstance(error, OSError) else str(error)
+            todo = "try again later" if "locked" in str(what) else "name a file you may write with --store"
+            raise InputError(f"store {self.path}: {what} - {todo}") from error

@@ -1,0 +1,1 @@
+"""`routes run`: cost and error of every route."""

@@ -1,0 +1,1 @@
+"""`routes check`: a verdict on anyone's gradient."""

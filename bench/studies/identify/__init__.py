@@ -1,0 +1,1 @@
+"""`routes identify`: what the data determine of p."""

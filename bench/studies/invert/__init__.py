@@ -1,0 +1,1 @@
+"""`routes invert`: p estimated from data."""

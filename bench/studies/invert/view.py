@@ -1,0 +1,163 @@
+"""An inversion for a terminal: iteration by iteration as it runs, then what it cost and what it found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from gradient_routes.bench.inversion.history import Iterate
+from gradient_routes.bench.inversion.invert import Inversion
+from gradient_routes.bench.render.format import number, seconds
+from gradient_routes.bench.render.terminal.palette import route_style
+from gradient_routes.bench.render.terminal.plot import Series, marks, plot
+from gradient_routes.problems.problem import Array
+
+WIDTHS = {"k": 4, "J": 10, "misfit": 10, "alpha Phi": 10, "|dJ/dp|": 9, "|step|": 8, "fwd": 5, "adj": 5, "time": 8}
+HEADINGS = " ".join(name.rjust(width) for name, width in WIDTHS.items())
+LEGEND = (
+    "fwd, adj: forward solves, and linearized or transposed ones, so far; |step|: in natural changes of p;"
+    " off: |p - p_true| / |p_0 - p_true|"
+)
+MANY = 40  # parameters; of more, both ends are shown
+COORDINATES = ("x", "y", "z")
+SAME = 1e-6  # of J
+BARS = 12  # characters of the longest bar
+
+
+def heading(out: Console, truth: bool) -> None:
+    out.print(Text(HEADINGS + (f" {'off':>7}" if truth else ""), style="bold"))
+
+
+def line(out: Console, step: Iterate) -> None:
+    """One iteration, as soon as it is known."""
+    off = "" if step.distance is None else f" {step.distance:>7.3g}"
+    text = (
+        f"{step.iteration:>4} {step.objective:>10.4g} {step.misfit:>10.4g} {step.regularization:>10.3g}"
+        f" {step.gradient_norm:>9.3g} {number(step.step_length) or '':>8} {step.forward_solves:>5}"
+        f" {step.adjoint_solves:>5} {seconds(step.seconds):>8}{off}"
+    )
+    out.print(Text(text))
+    if step.says:
+        out.print(Text(f"     {step.says}", style="yellow"), soft_wrap=True)
+
+
+def ended(out: Console, found: Inversion, one_shot: float | None = None) -> None:
+    """Why it stopped, and how it stands to the one-shot answer."""
+    well = found.end.startswith("converged")
+    out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=True)
+    out.print(Text(found.scaled, style="dim"), soft_wrap=True)
+    if one_shot is not None:
+        above = found.iterates[-1].objective / one_shot - 1.0 if one_shot > 0.0 else 0.0
+        stands = "meets the one-shot answer" if above <= SAME else "stays above the one-shot answer"
+        out.print(Text(f"the loop {stands}: J is {above:+.1e} of it away"), soft_wrap=True)
+
+
+def costs(done: Sequence[Inversion]) -> Table:
+    """What it takes to reach a misfit, route by route: the number a user decides with."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    table.add_column("to reach a misfit of")
+    for found in done:
+        style = route_style(found.route)
+        table.add_column(Text(found.label.partition(" by ")[2], style=style), justify="right")
+    for level in levels(done):
+        table.add_row(f"{level:.3g}", *(_cost(found, level) for found in done))
+    return table
+
+
+def levels(done: Sequence[Inversion]) -> list[float]:
+    """Decades of the misfit from the start's down to the least that any reaches."""
+    first = max(found.iterates[0].misfit for found in done)
+    least = min(step.misfit for found in done for step in found.iterates)
+    if not first > 0.0:
+        return []
+    decades = math.floor(math.log10(first / max(least, 1e-12 * first)))
+    every = max(1, math.ceil(decades / 8))
+    return [first * 10.0**-k for k in range(every, decades + 1, every)] or [least]
+
+
+def _cost(found: Inversion, level: float) -> str:
+    step = next((step for step in found.iterates if step.misfit <= level), None)
+    if step is None:
+        return "not reached"
+    adjoint = f" + {step.adjoint_solves} adj" if step.adjoint_solves else ""
+    return f"{step.forward_solves} fwd{adjoint}, {seconds(step.seconds)}"
+
+
+def estimates(found: Inversion) -> Table:
+    """Parameter by parameter: start, estimate, truth, the gradient that is left, beside it what the problem shows (of
+    the bar the two strains it is the product of); blind ones hatched."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold", title_justify="left")
+    table.title = Text(found.label, style="bold")
+    q = found.made.parameters
+    beside = {name: column for name, column in found.view.columns.items() if name not in COORDINATES}
+    names = ["p", "start", "estimate", *(["truth"] if found.truth is not None else []), "dJ/dp", *beside, ""]
+    for name in names:
+        table.add_column(Text(name), justify="left" if name in ("p", "") else "right")
+    n, largest = found.n_param, float(np.abs(found.p).max()) or 1.0
+    shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
+    for i in shown:
+        if i is None:
+            table.add_row(f"... {n - MANY} more", style="dim")
+            continue
+        hidden = found.view.blind is not None and bool(found.view.blind[i])
+        values = [found.start[i], found.p[i], *([] if found.truth is None else [found.truth[i]]), found.gradient[i]]
+        values += [column[i] for column in beside.values()]
+        bar = "/" * BARS + " blind" if hidden else "#" * round(BARS * abs(float(found.p[i])) / largest)
+        label = f"{q.label(i)} [{q.unit_of(i)}]"
+        table.add_row(Text(label), *(f"{v:.6g}" for v in values), bar, style="dim" if hidden else None)
+    return table
+
+
+def cells(found: Inversion) -> Text:
+    """The estimate of a field on a box in its middle slice, cell by cell, beside the truth; blind cells masked."""
+    position, p = found.made.parameters.position, found.p
+    if position is None or position.shape[1] != 3 or found.n_param < MANY or not np.isfinite(p).all():
+        return Text()
+    middle = np.unique(position[:, 1].round(9))
+    at = np.flatnonzero(np.isclose(position[:, 1], middle[len(middle) // 2]))
+    if len(at) != len(np.unique(position[at, 0].round(9))) * len(np.unique(position[at, 2].round(9))):
+        return Text()  # no grid, or several parameters in one place
+    blind = found.view.blind
+    masked = p if blind is None else np.where(blind, np.nan, p)
+    shades = [("estimate", masked)] + ([] if found.truth is None else [("truth", found.truth)])
+    low, high = (float(f(np.concatenate([v[at] for _, v in shades]))) for f in (np.nanmin, np.nanmax))
+    pictures = [_picture(position[at][:, [0, 2]], values[at], low, high) for _, values in shades]
+    width = max(map(len, pictures[0]))
+    rows = ["  ".join(name.ljust(width) for name, _ in shades)]
+    rows += ["  ".join(parts) for parts in zip(*pictures, strict=True)]
+    y = middle[len(middle) // 2]
+    mask = "" if blind is None or not blind.any() else ", / blind"
+    return Text(f"slice y = {y:.3g}, x to the right, z up; ' ' {low:.3g} to '@' {high:.3g}{mask}\n" + "\n".join(rows))
+
+
+def _picture(xz: Array, values: Array, low: float, high: float) -> list[str]:
+    tones = " .:-=+*#%@"
+    xs, zs = (np.unique(xz[:, k].round(9)) for k in (0, 1))
+    grid = np.full((len(zs), len(xs)), np.nan)
+    grid[np.searchsorted(zs, xz[:, 1].round(9)), np.searchsorted(xs, xz[:, 0].round(9))] = values
+    span = (high - low) or 1.0
+
+    def tone(value: float) -> str:
+        return "/" if not np.isfinite(value) else tones[min(len(tones) - 1, int((value - low) / span * len(tones)))]
+
+    return ["".join(2 * tone(value) for value in row) for row in grid[::-1]]
+
+
+def history(done: Sequence[Inversion], width: int) -> Text:
+    """Misfit against forward solves, each route."""
+    names = [found.label.partition(" by ")[2] for found in done]
+    letters = marks([found.route for found in done])
+    drawn = [
+        Series(name, *_paid(found), mark, route_style(found.route))
+        for name, mark, found in zip(names, letters, done, strict=True)
+    ]
+    return plot(drawn, "forward solves", "misfit", width)
+
+
+def _paid(found: Inversion) -> tuple[list[float | None], list[float | None]]:
+    return [step.forward_solves for step in found.iterates], [step.misfit for step in found.iterates]

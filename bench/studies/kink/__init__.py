@@ -1,0 +1,1 @@
+"""`routes kink`: dJ/dp where the active set of a contact changes."""

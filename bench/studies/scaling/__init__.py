@@ -1,0 +1,1 @@
+"""`routes scaling`: cost against problem size."""

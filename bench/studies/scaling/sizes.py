@@ -1,0 +1,95 @@
+"""The sizes of one problem: a grid of whole numbers that was asked for, or its option n, climbing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.case import ProblemSpec
+from gradient_routes.bench.cases.options import options_of
+from gradient_routes.problems.errors import InputError, RoutesError
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Problems from small to large: equal but for `varied`, the names of options. `family` is what they share."""
+
+    specs: tuple[ProblemSpec, ...]
+    varied: tuple[str, ...]
+
+    @property
+    def family(self) -> dict[str, Any]:
+        return {name: value for name, value in self.specs[0].options.items() if name not in self.varied}
+
+    def label(self, spec: ProblemSpec) -> str:
+        return ",".join(f"{name}={spec.options[name]}" for name in self.varied) or spec.name
+
+    def magnitude(self, spec: ProblemSpec) -> float:
+        return float(math.prod(spec.options[name] for name in self.varied))
+
+
+def sizes(specs: Sequence[ProblemSpec], first: int | None, growth: float, levels: int) -> Sizes:
+    """The grid as it is, or, of a single problem, `levels` of them. Raises InputError."""
+    return grid(specs) if len(specs) > 1 else climb(specs[0], first, growth, levels)
+
+
+def grid(specs: Sequence[ProblemSpec]) -> Sizes:
+    """Several problems, which may differ in whole numbers only. Raises InputError."""
+    name, options = specs[0].name, specs[0].options
+    if any(spec.name != name for spec in specs):
+        raise InputError(f"scaling: {', '.join(dict.fromkeys(s.name for s in specs))} - name one problem")
+    varied = tuple(key for key in options if len({repr(spec.options[key]) for spec in specs}) > 1)
+    for key in varied:
+        values = [spec.options[key] for spec in specs]
+        wrong = [v for v in values if isinstance(v, bool) or not isinstance(v, int) or v < 1]
+        if wrong:
+            raise InputError(f"{name}: {key}={wrong[0]} is no size - sizes are whole numbers >= 1; take one {key}")
+    of = Sizes(tuple(specs), varied)
+    return replace(of, specs=tuple(sorted(specs, key=of.magnitude)))
+
+
+def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int) -> Sizes:
+    """n such that the unknowns grow by `growth` a level, from `first` or the n given. Raises InputError."""
+    if levels == 1 and first is None:
+        return Sizes((spec,), ("n",) if "n" in spec.options else ())
+    start = _start(spec, first)
+    per_n = _dimension(spec, start)
+    ns = [start]
+    for level in range(1, levels):
+        ns.append(max(ns[-1] + 1, round(start * growth ** (level / per_n))))
+    return Sizes(tuple(_sized(spec, n) for n in ns), ("n",))
+
+
+def _start(spec: ProblemSpec, first: int | None) -> int:
+    option = options_of(registry.factory_of(spec.build)).get("n")
+    if option is None or int not in option.kinds:
+        raise InputError(f"{spec.name}: has no whole number n to climb by - give a grid: '{spec.name}[KEY=1|2|4]'")
+    start = spec.options["n"] if first is None else first
+    if start is None or start < 1:
+        raise InputError(f"{spec.name}: n={start} is no size - say where to begin: --from N")
+    return int(start)
+
+
+def _sized(spec: ProblemSpec, n: int) -> ProblemSpec:
+    return replace(spec, options=spec.options | {"n": n})
+
+
+def _dimension(spec: ProblemSpec, n: int) -> float:
+    """d of n_u ~ n^d, by what twice as much n gives."""
+    few, many = (_unknowns(_sized(spec, size)) for size in (n, 2 * n))
+    if few >= many:
+        raise InputError(f"{spec.name}: n={n} has {few} unknowns, n={2 * n} has {many} - give a grid of sizes")
+    return math.log2(many / few)
+
+
+def _unknowns(spec: ProblemSpec) -> int:
+    try:
+        return spec().n_state
+    except RoutesError:
+        raise
+    except Exception as failure:  # of a plug-in
+        said = " ".join(str(failure).split())
+        raise InputError(f"problem '{spec.name}' cannot be built: {type(failure).__name__}: {said} - mend it") from None

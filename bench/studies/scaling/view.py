@@ -1,0 +1,140 @@
+"""The study of scaling for a terminal: bills by size, laws of growth, the largest sizes, the break-even."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rich.console import Console, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.execution.cost_model import LEGEND, summary
+from gradient_routes.bench.render.format import bytes_, ratio, seconds
+from gradient_routes.bench.render.terminal import tables
+from gradient_routes.bench.render.terminal.palette import route_style
+from gradient_routes.bench.render.terminal.plot import Series, marks, plot
+from gradient_routes.bench.studies.scaling import break_even_view as break_even
+from gradient_routes.bench.studies.scaling import growth_view as growth
+from gradient_routes.bench.studies.scaling.climbing import Series as Routes
+from gradient_routes.bench.studies.scaling.measure import Scaling, abscissa, abscissas, iterated, value
+from gradient_routes.routes.tally import Work
+
+WIDE = 130  # columns from which plots stand side by side
+BILLS = f"time: one gradient, x fwd: in forward solves; memory: peak of one call; tape: kept by AD\nwork: {LEGEND}"
+
+
+def show(done: Scaling, plotted: bool = True) -> None:
+    out = tables.console()
+    if plotted and any(series.rows for series in done.series):
+        out.print(plots(done, out.width))
+        out.print()
+    _section(out, f"{family(done)}: what a gradient costs", bills(done), BILLS)
+    if done.growths:
+        _section(out, "how it grows", growth.table(done), growth.legend(done))
+    _section(out, "the largest size under the caps", reached(done))
+    if done.break_evens:
+        _section(out, break_even.title(done), break_even.table(done.break_evens), break_even.LEGEND)
+        tables.show(out, break_even.lines(done.break_evens))
+    elif done.no_break_even is not None:
+        out.print(Text(f"no break-even: {done.no_break_even}", style="dim"), soft_wrap=not out.is_terminal)
+
+
+def family(done: Scaling) -> str:
+    """The selector without what makes the size."""
+    return tables.named("problem", {"problem": done.sizes.specs[0].name, "problem_options": done.sizes.family})
+
+
+def name(series: Routes) -> str:
+    """The selector of a route as it was asked for."""
+    return tables.named("route", {"route": series.route.route.name, "route_options": series.route.options})
+
+
+def _section(out: Console, title: str, table: Table, legend: str = "") -> None:
+    out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
+    tables.show(out, table)
+    if legend:
+        out.print(Text(legend, style="dim"), soft_wrap=not out.is_terminal)
+    out.print()
+
+
+def bills(done: Scaling) -> Table:
+    """One line a case under the line of its route."""
+    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    out.add_column("route\n  size", overflow="fold", min_width=10)
+    for heading in ("n_u", "n_p", "time", "x fwd", "memory"):
+        out.add_column(heading, justify="right", no_wrap=True)
+    taped = any(row["tape_bytes"] for row in done.rows)
+    if taped:
+        out.add_column("tape", justify="right", no_wrap=True)
+    out.add_column("work", overflow="fold", min_width=10)
+    for series in done.series:
+        out.add_row(Text(name(series), style=route_style(series.route.route.name)))
+        for spec, row in series.cases:
+            out.add_row(
+                f"  {done.sizes.label(spec)}", *_cells(row, taped), style=None if row["status"] == "ok" else "dim"
+            )
+    return out
+
+
+def _cells(row: Row, taped: bool) -> Iterator[str]:
+    yield from ("" if row[key] is None else str(row[key]) for key in ("n_state", "n_param"))
+    yield seconds(row["seconds"]) if row["status"] == "ok" else row["status"]
+    yield ratio(row["forward_ratio"])
+    yield bytes_(row["peak_bytes"], tables.RESOLUTION)
+    if taped:
+        yield bytes_(row["tape_bytes"])
+    work = row["work"] or row["predicted_work"]
+    yield "" if work is None else summary(Work(**work))
+
+
+def reached(done: Scaling) -> Table:
+    """One line a route: the last size it gave a gradient on, and why none beyond."""
+    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    out.add_column("route", overflow="fold", min_width=14)
+    for heading in ("size", "n_u", "n_p", "time"):
+        out.add_column(heading, justify="right", no_wrap=True)
+    out.add_column("stopped by", overflow="fold", min_width=24)
+    for series in done.series:
+        ran = [(spec, row) for spec, row in series.cases if row["status"] == "ok"]
+        style = route_style(series.route.route.name)
+        cells = ["none", "", "", ""]
+        if ran:
+            spec, row = ran[-1]
+            cells = [done.sizes.label(spec), str(row["n_state"]), str(row["n_param"]), seconds(row["seconds"])]
+        out.add_row(Text(name(series), style=style), *cells, Text(series.stopped_by))
+    return out
+
+
+def plots(done: Scaling, width: int) -> RenderableType:
+    """Time against size, or against iterations where there is one size; beside it memory, where there is room."""
+    by_size = len(done.sizes.specs) > 1
+    every = list(done.series) if by_size else list(iterated(done.series))
+    against = "iterations"
+    if by_size:
+        rows = max((series.rows for series in every), key=len)
+        against = abscissas(rows)[0]
+    time = _curves(every, against, "seconds")
+    memory = _curves(every, against, "peak_bytes") if width >= WIDE else []
+    title = f"{family(done)}: time [s]"
+    label = {"n_state": "n_u", "n_param": "n_p"}.get(against, against)
+    if all(len(curve.x) < 2 for curve in memory):
+        return plot(time, label, title, width)
+    each = (width - 4) // 2
+    out = Table.grid(padding=(0, 4, 0, 0))
+    out.add_row(plot(time, label, title, each), plot(memory, label, "memory [byte]", each))
+    return out
+
+
+def _curves(every: Sequence[Routes], against: str, quantity: str) -> list[Series]:
+    """Of those with something to draw; all have the mark they have in the other plot."""
+    names = [series.route.route.name for series in every]
+    letters = marks([n if names.count(n) == 1 else name(series) for n, series in zip(names, every, strict=True)])
+    curves = []
+    for series, mark in zip(every, letters, strict=True):
+        points = [(abscissa(row, against), value(row, quantity)) for row in series.rows]
+        known = [(x, y) for x, y in points if x is not None and y is not None]
+        if known:
+            x, y = zip(*known, strict=True)
+            curves.append(Series(name(series), x, y, mark, route_style(series.route.route.name)))
+    return curves

@@ -1,0 +1,1 @@
+"""`routes tolerance`: gradient error against solver tolerance."""

@@ -1,0 +1,1 @@
+"""`routes unrolling`: error and tape of unrolled AD against the iteration count."""

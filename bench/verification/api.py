@@ -1,0 +1,80 @@
+"""`check` and `assert_gradient`: the command `routes check` as functions, for scripts and anyone's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from gradient_routes.bench.verification import foreign
+from gradient_routes.bench.verification.check import check as check_subject
+from gradient_routes.bench.verification.foreign import Bounds
+from gradient_routes.bench.verification.plan import Plan
+from gradient_routes.bench.verification.result import Check
+from gradient_routes.problems.errors import InputError
+
+
+def check(
+    objective: Any,
+    gradient: Callable[..., Any] | None = None,
+    start: Any = None,
+    *,
+    scale: Any = None,
+    bounds: Bounds | None = None,
+    names: Sequence[str] | None = None,
+    tighten: Callable[[float], Any] | None = None,
+    active_set: Callable[..., Any] | None = None,
+    budget: float = 200,
+    seed: int = 0,
+    accept: float = 0.0,
+    name: str | None = None,
+) -> Check:
+    """Is this gradient right? The verdict with the numbers it rests on.
+
+    objective  J(p) -> a number, p (n_p,) float64; or one object with objective(p) and gradient(p), or
+               value_and_gradient(p), and start, and whatever of the keywords below it offers as attributes
+    gradient   dJ/dp(p) -> (n_p,)
+    start      p (n_p,) to check at
+    scale      natural changes, > 0 [|p_i|, for zeros the median of the others or 1]
+    bounds     (lower, upper), numbers or arrays: no point outside is asked for
+    tighten    tighten(factor) -> (objective, gradient), or such an object, the solver's tolerance times factor < 1
+    active_set active_set(p) -> a hashable, which smooth branch of J holds
+    budget     objective calls at most
+    accept     relative error of the gradient that is good enough [1e-7]
+
+    Raises InputError for what cannot be asked; what the code itself does wrong is part of the verdict.
+    """
+    plan = Plan(budget=budget, seed=seed)
+    if gradient is None:
+        given = {"scale": scale, "bounds": bounds, "names": names, "tighten": tighten, "active_set": active_set}
+        own = [key for key, value in given.items() if value is not None]
+        if own:
+            raise InputError(f"check: an object brings its own {own[0]} - make it an attribute")
+        return check_subject(foreign.subject_of(objective, name or type(objective).__name__, start), plan, accept)
+    if start is None:
+        raise InputError("check: no start - give the point p to check at")
+    subject = foreign.subject(
+        objective,
+        gradient,
+        start,
+        name=name or str(getattr(gradient, "__name__", "the gradient")),
+        scale=scale,
+        bounds=bounds,
+        names=names,
+        tighten=tighten,
+        active_set=active_set,
+    )
+    return check_subject(subject, plan, accept)
+
+
+def assert_gradient(
+    objective: Any, gradient: Callable[..., Any] | None = None, start: Any = None, **keywords: Any
+) -> None:
+    """Raise AssertionError unless `check` of the same arguments, keywords included, says that the gradient agrees.
+
+    def test_my_gradient():
+        assert_gradient(J, dJ, start=np.ones(3), budget=100)
+    """
+    __tracebackhide__ = True  # pytest then shows the caller's line
+    found = check(objective, gradient, start, **keywords)
+    if found.verdict != "agrees":
+        raise AssertionError(str(found))

@@ -1,0 +1,1 @@
+"""Development benchmarks, not installed: limits, verdict quality, cost of the harness."""

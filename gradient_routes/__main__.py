@@ -1,0 +1,8 @@
+"""`python -m gradient_routes` is the command `routes`."""
+
+from __future__ import annotations
+
+from gradient_routes.bench.cli import main
+
+if __name__ == "__main__":
+    main(prog_name="routes")

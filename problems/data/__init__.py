@@ -1,0 +1,1 @@
+"""Measured and synthetic data: sensors, probes, observations, priors, CSV files."""

@@ -1,0 +1,1 @@
+"""Matrices with a fixed pattern: sparse and tridiagonal."""

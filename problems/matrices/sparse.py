@@ -1,0 +1,194 @@
+"""Sparse matrices with a fixed pattern, assembled by adding element entries into slots found once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gradient_routes.problems.problem import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricPattern:
+    """Where the upper triangle of a symmetric (n, n) matrix has entries, in CSR form with sorted columns.
+
+    slots (n_e, m (m + 1) / 2) sends the upper triangle of every (m, m) element matrix, row by row, to its entry;
+    entries of constrained unknowns go to slot nnz, which is dropped. near_kernel (n, k), the rigid motions say, is what
+    the matrix nearly maps to zero: multigrid wants to know.
+    """
+
+    n: int
+    indptr: Array
+    indices: Array
+    slots: Array
+    near_kernel: Array | None = None
+
+    @classmethod
+    def of_elements(cls, unknowns: Array, n: int, near_kernel: Array | None = None) -> SymmetricPattern:
+        """From unknowns (n_e, m), the numbers 0..n-1 of every element's unknowns, -1 where constrained."""
+        i, j = np.triu_indices(unknowns.shape[1])
+        a, b = unknowns[:, i].astype(np.int64), unknowns[:, j].astype(np.int64)
+        free = (a >= 0) & (b >= 0)
+        return cls(n, *_slots(np.minimum(a, b), np.maximum(a, b), free, n), near_kernel)
+
+    def assemble(self, entries: Array) -> SymmetricSparse:
+        """Sum entries (n_e, m (m + 1) / 2), the upper triangles of the element matrices, into a matrix."""
+        return SymmetricSparse(self, _summed(self.slots, entries.ravel(), len(self.indices)))
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricSparse:
+    """A symmetric matrix (not Hermitian where complex): data (nnz,) of the upper triangle of its pattern."""
+
+    pattern: SymmetricPattern
+    data: Array
+
+    @property
+    def T(self) -> SymmetricSparse:
+        return self
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.pattern.n, self.pattern.n
+
+    @cached_property
+    def upper(self) -> Any:
+        """The upper triangle as a SciPy CSR array that shares this one's memory."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.data, self.pattern.indices, self.pattern.indptr), shape=self.shape)
+
+    @cached_property
+    def diagonal(self) -> Array:
+        """Its diagonal (n,): first in every sorted row of the upper triangle."""
+        return np.asarray(self.data[self.pattern.indptr[:-1]])
+
+    def full(self) -> Any:
+        """Both triangles, as a SciPy CSC array."""
+        from scipy.sparse import triu
+
+        return (self.upper + triu(self.upper, k=1).T).tocsc()
+
+    def __matmul__(self, v: Array) -> Array:
+        return np.asarray(self.upper @ v + self.upper.T @ v - self.diagonal * v)
+
+    @property
+    def norm(self) -> float:
+        """|A|_inf."""
+        rows = abs(self.upper) @ np.ones(self.pattern.n) + abs(self.upper).T @ np.ones(self.pattern.n)
+        return float((rows - abs(self.diagonal)).max())
+
+    @property
+    def nbytes(self) -> int:
+        return int(self.data.nbytes)
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralPattern:
+    """Where an (n, n) matrix has entries, in CSR form with sorted columns.
+
+    slots (n_e, m, m) sends every entry of the element matrices to its own; those of constrained unknowns go to slot
+    nnz, which is dropped.
+    """
+
+    n: int
+    indptr: Array
+    indices: Array
+    slots: Array
+
+    @classmethod
+    def of_elements(cls, unknowns: Array, n: int) -> GeneralPattern:
+        """From unknowns (n_e, m), the numbers 0..n-1 of every element's unknowns, -1 where constrained."""
+        a, b = (x.astype(np.int64) for x in np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
+        return cls(n, *_slots(a, b, (a >= 0) & (b >= 0), n))
+
+    def assemble(self, entries: Array) -> GeneralSparse:
+        """Sum element matrices (n_e, m, m), rows first, into a matrix."""
+        return GeneralSparse(self, _summed(self.slots, entries.ravel(), len(self.indices)))
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralSparse:
+    """A matrix without symmetry: data (nnz,) in the order of its pattern."""
+
+    pattern: GeneralPattern
+    data: Array
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.pattern.n, self.pattern.n
+
+    @cached_property
+    def rows(self) -> Any:
+        """A SciPy CSR array that shares this one's memory."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.data, self.pattern.indices, self.pattern.indptr), shape=self.shape)
+
+    @property
+    def T(self) -> Any:
+        """The transpose for products: a SciPy CSC array on the same memory."""
+        return self.rows.T
+
+    def full(self) -> Any:
+        """A SciPy CSC array."""
+        return self.rows.tocsc()
+
+    def __matmul__(self, v: Array) -> Array:
+        return np.asarray(self.rows @ v)
+
+    @property
+    def norm(self) -> float:
+        """|A|_inf."""
+        return float((abs(self.rows) @ np.ones(self.pattern.n)).max())
+
+    @property
+    def nbytes(self) -> int:
+        return int(self.data.nbytes)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockDiagonal:
+    """diag(A_1, ..., A_c): several load cases in one state u = (u_1, ..., u_c), each with its own matrix."""
+
+    blocks: tuple[Any, ...]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        n = sum(A.shape[0] for A in self.blocks)
+        return n, n
+
+    @property
+    def T(self) -> BlockDiagonal:
+        return BlockDiagonal(tuple(A.T for A in self.blocks))
+
+    def split(self, v: Array) -> list[Array]:
+        """The parts of v (n,) that belong to the blocks."""
+        return np.split(v, np.cumsum([A.shape[0] for A in self.blocks])[:-1])
+
+    def __matmul__(self, v: Array) -> Array:
+        return np.concatenate([A @ part for A, part in zip(self.blocks, self.split(v), strict=True)])
+
+    @property
+    def norm(self) -> float:
+        """|A|_inf."""
+        return max(float(A.norm) for A in self.blocks)
+
+
+def _slots(rows: Array, columns: Array, free: Array, n: int) -> tuple[Array, Array, Array]:
+    """indptr, indices and flat slots of the CSR pattern that holds all free (row, column) pairs."""
+    keys, slots_of_free = np.unique(rows[free] * n + columns[free], return_inverse=True)
+    slots = np.full(free.shape, len(keys), dtype=np.int32)
+    slots[free] = slots_of_free
+    indptr = np.searchsorted(keys, n * np.arange(n + 1, dtype=np.int64)).astype(np.int32)
+    return indptr, (keys % n).astype(np.int32), slots.ravel()
+
+
+def _summed(slots: Array, entries: Array, nnz: int) -> Array:
+    """(nnz,) sums of the entries that share a slot."""
+    if np.iscomplexobj(entries):
+        return _summed(slots, entries.real, nnz) + 1j * _summed(slots, entries.imag, nnz)
+    return np.bincount(slots, weights=entries, minlength=nnz + 1)[:-1]

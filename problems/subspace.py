@@ -1,0 +1,207 @@
+"""A problem seen through a few directions: p = base + V c. Every route then runs on c as it runs on p."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gradient_routes.problems.problem import (
+    Array,
+    Linearization,
+    Operator,
+    Parameters,
+    ParameterView,
+    Problem,
+    Reference,
+    Traced,
+)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The (n_p, m) matrix of the columns `index` (m,) of the identity, of which nothing but `index` is stored."""
+
+    index: Array
+    n_p: int
+
+    @property
+    def T(self) -> SelectionTransposed:
+        return SelectionTransposed(self)
+
+    def __matmul__(self, c: Any) -> Any:
+        """c (m,) spread over n_p components; traceable."""
+        if isinstance(c, np.ndarray):
+            v = np.zeros(self.n_p, c.dtype)
+            v[self.index] = c
+            return v
+        from gradient_routes.problems.jax64 import jnp
+
+        return jnp.zeros(self.n_p, jnp.asarray(c).dtype).at[self.index].set(c)
+
+
+@dataclass(frozen=True)
+class SelectionTransposed:
+    """Picks the components `index` of a vector (n_p,)."""
+
+    T: Selection
+
+    def __matmul__(self, g: Any) -> Any:
+        return g[self.T.index]
+
+
+@dataclass(frozen=True)
+class Product:
+    """The matrix A B, never formed."""
+
+    A: Operator
+    B: Operator
+
+    @property
+    def T(self) -> Product:
+        return Product(self.B.T, self.A.T)
+
+    def __matmul__(self, v: Any) -> Any:
+        return self.A @ (self.B @ v)
+
+
+@dataclass(frozen=True)
+class Coordinates(Parameters):
+    """c (m,) of p = base + V c: inside its domain where it is within its bounds and p within those of p."""
+
+    p: Callable[[Array], Array] = field(kw_only=True)
+    of: Parameters = field(kw_only=True)
+
+    def check(self, c: Array, who: str) -> Array:
+        c = super().check(c, who)
+        self.of.check(self.p(c), who)
+        return c
+
+
+class Restricted(Problem):
+    """`problem` as a function of c (m,) alone, p = base + V c; its gradient is V^T dJ/dp.
+
+    V (n_p, m) is a dense array for directions, a Selection for components; see the two functions below.
+    """
+
+    def __init__(self, problem: Problem, V: Operator, base: Array, **parameters: Any) -> None:
+        self.problem, self.V, self.base = problem, V, base
+        self.name, self.notes = problem.name, problem.notes
+        self.offers, self.structure, self.linear = problem.offers, problem.structure, problem.linear
+        self.n_state, self.offset, self.matrix_free = problem.n_state, problem.offset, problem.matrix_free
+        self.load_steps, self.line_search = problem.load_steps, problem.line_search
+        self.parameters = Coordinates(**parameters, p=self.p, of=problem.parameters)
+
+    def p(self, c: Any) -> Any:
+        """p (n_p,) at c (m,); traceable."""
+        return self.base + self.V @ c
+
+    def value(self, p: Array) -> float:
+        return self.problem.value(self.p(p))
+
+    def initial(self, p: Array) -> Array:
+        return self.problem.initial(self.p(p))
+
+    def residual(self, u: Array, p: Array) -> Array:
+        return self.problem.residual(u, self.p(p))
+
+    def tangent(self, u: Array, p: Array) -> Any:
+        return self.problem.tangent(u, self.p(p))
+
+    def tangent_operator(self, u: Array, p: Array) -> Operator:
+        return self.problem.tangent_operator(u, self.p(p))
+
+    def objective(self, u: Array, p: Array) -> Any:
+        return self.problem.objective(u, self.p(p))
+
+    def linearize(self, u: Array, p: Array) -> Linearization:
+        lin = self.problem.linearize(u, self.p(p))
+        return Linearization(Product(lin.R_p, self.V), lin.J_u, self.V.T @ lin.J_p)
+
+    def traced(self) -> Traced:
+        inner = self.problem.traced()
+        diagonal, bound = inner.diagonal, inner.spectral_bound
+        return Traced(
+            residual=lambda u, c: inner.residual(u, self.p(c)),
+            objective=lambda u, c: inner.objective(u, self.p(c)),
+            diagonal=None if diagonal is None else lambda c: diagonal(self.p(c)),
+            spectral_bound=None if bound is None else lambda c: bound(self.p(c)),
+        )
+
+    def reference(self, p: Array) -> Reference | None:
+        """|V| times the size of the whole: no sum of its terms by V is larger."""
+        inner = self.problem.reference(self.p(p))
+        if inner is None:
+            return None
+        norm = 1.0 if isinstance(self.V, Selection) else float(np.linalg.norm(np.asarray(self.V)))
+        return Reference(inner.name, self.V.T @ inner.gradient, norm * inner.size)
+
+    def active_set(self, u: Array, p: Array) -> Hashable | None:
+        return self.problem.active_set(u, self.p(p))
+
+    def condition(self, p: Array) -> float | None:
+        return self.problem.condition(self.p(p))
+
+    def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
+        """The rows of the components; a direction has none."""
+        if not isinstance(self.V, Selection):
+            return ParameterView()
+        inner = self.problem.view(self.p(p), u, lam)
+        columns = {name: self.V.T @ column for name, column in inner.columns.items()}
+        return ParameterView(columns, None if inner.blind is None else self.V.T @ inner.blind, inner.mark)
+
+
+def components(problem: Problem, p: Array, index: Array) -> Restricted:
+    """The problem in the components `index` (m,) of p, the others held: c_j = p_index[j] with its scale and bounds.
+
+    Finite differences therefore take the steps they would take in the whole gradient.
+    """
+    of, V = problem.parameters, Selection(np.asarray(index), len(p))
+    base = p.copy()
+    base[V.index] = 0.0  # V c is added to it, and 0 + c is c without rounding
+    lower, upper = (np.broadcast_to(bound, p.shape)[V.index] for bound in (of.lower, of.upper))
+    return Restricted(
+        problem,
+        V,
+        base,
+        start=p[V.index],
+        scale=of.scale[V.index],
+        lower=lower,
+        upper=upper,
+        unit=tuple(of.unit_of(int(i)) for i in V.index),
+        label=lambda j: of.label(int(V.index[j])),
+        position=None if of.position is None else of.position[V.index],
+    )
+
+
+def directions(problem: Problem, p: Array, m: int, seed: int) -> Restricted:
+    """The problem along m random directions v_i = xi_i max(|p_i|, s_i) from p, where c = 0.
+
+    xi_i has either sign and a size of 1/2 to 3/2, so that no direction misses a component, as normal numbers may.
+    The bounds of c_j are those that p + v_j c_j keeps; several c_j at once may leave p's domain within them.
+    """
+    of = problem.parameters
+    rng = np.random.default_rng(seed)
+    xi = rng.choice([-1.0, 1.0], (m, len(p))) * rng.uniform(0.5, 1.5, (m, len(p)))
+    V = (xi * of.natural(p)).T
+    lower, upper = _room(p, V, of)
+    return Restricted(
+        problem,
+        V,
+        p,
+        start=np.zeros(m),
+        scale=np.ones(m),
+        lower=lower,
+        upper=upper,
+        label=lambda j: f"direction {j + 1}",
+    )
+
+
+def _room(p: Array, V: Array, of: Parameters) -> tuple[Array, Array]:
+    """The largest open intervals (m,) of c_j about 0 on which p + v_j c_j stays within its bounds."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = [(np.broadcast_to(bound, p.shape) - p)[:, None] / V for bound in (of.lower, of.upper)]
+    below, above = np.fmin(*ends), np.fmax(*ends)
+    return np.fmax.reduce(below, initial=-np.inf), np.fmin.reduce(above, initial=np.inf)

@@ -1,0 +1,275 @@
+"""Hostile plug-ins, streams and stores: every fault ends in a row or in one line, never in a wrong number."""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import shell, with_routes
+
+EVIL = '''
+import numpy as np
+from gradient_routes.problems.problem import Offers, Parameters, Problem
+from gradient_routes.routes.route import Offers, Result, Work, route
+
+def cost(n_p, forward, **options):
+    return Work()
+
+def evil(name, answer):
+    @route(name, needs=Offers.VALUE, cost=cost)
+    def function(model, p):
+        """An answer that is none."""
+        return answer(p)
+    return function
+
+def leave(p):
+    raise SystemExit(0)
+
+mutates = evil("mutates", lambda p: (1.0, p.__iadd__(1)))
+leaves = evil("leaves", leave)
+nan_J = evil("nan-J", lambda p: (float("nan"), p))
+short = evil("short", lambda p: (1.0, p[:-1]))
+complex_ = evil("complex", lambda p: (1.0, p + 0j))
+nothing = evil("nothing", lambda p: None)
+numpyish = evil("numpyish", lambda p: Result(np.float32(1), p, None, np.float32(0.5), None, np.int64(3)))
+talks = evil("talks", lambda p: (print("garbage"), (1.0, p))[1])
+misnamed = evil("adjoint", lambda p: (1.0, p))
+
+class Box(Problem):
+    name = "box"
+    def __init__(self, *, start=(3,), J: float = 1.0):
+        self.parameters = Parameters(start=np.array(start), scale=np.ones(len(start)), lower=0.0)
+    def value(self, p):
+        return float((p**2).sum())
+
+def make(*, d: float = 0.5) -> Problem:
+    """A factory function."""
+    return Box()
+
+def outside():
+    return Box(start=(-1.0,))
+
+def raises():
+    raise ValueError("not today")
+
+def no_problem():
+    return 3
+'''
+ROUTES = "mutates leaves nan-J short complex nothing numpyish talks".split()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    site = tmp_path_factory.mktemp("evil")
+    (site / "evil.py").write_text(EVIL)
+    (site / "exits.py").write_text("raise SystemExit(3)")
+    info = site / "evil-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: evil\nVersion: 1.0\n")
+    names = {"complex": "complex_", "nan-J": "nan_J"}
+    routes = "\n".join(f"{name} = evil:{names.get(name, name)}" for name in [*ROUTES, "misnamed"])
+    problems = "\n".join(f"{name} = evil:{name}" for name in "Box make outside raises no_problem".split())
+    (info / "entry_points.txt").write_text(
+        f"[gradient_routes.routes]\n{routes}\n"
+        f"[gradient_routes.problems]\n{problems}\nexits = exits:x\npi = math:pi\nbar = evil:Box\n"
+    )
+    return site
+
+
+def routes(site: Path, arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return shell(f"routes {arguments}", cwd, PYTHONPATH=str(site))
+
+
+def test_foreign_routes_fail_alone(site: Path, tmp_path: Path) -> None:
+    chosen = " ".join(f"--route {name}" for name in [*ROUTES, "adjoint"])
+    done = routes(site, f"run --json --problem bar {chosen} --min-time 0", tmp_path)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    rows = {row["route"]: row for row in map(json.loads, done.stdout.splitlines())}
+    assert [name for name, row in rows.items() if row["status"] == "ok"] == ["numpyish", "talks", "adjoint"]
+    for name, says in {
+        "mutates": "read-only",
+        "leaves": "SystemExit",
+        "nan-J": "J = nan",
+        "short": "shape (7,) for 8",
+        "complex": "complex",
+        "nothing": "TypeError",
+    }.items():
+        assert says in rows[name]["reason"]
+    assert rows["numpyish"]["residual"] == 0.5
+    assert rows["adjoint"]["gradient_error"] < 1e-15, "what a route did to p must not reach the next"
+    assert "garbage" in rows["talks"]["stderr"], "what a plug-in prints is no result"
+
+
+def test_foreign_problems_fail_alone(site: Path, tmp_path: Path) -> None:
+    done = routes(site, "run --json --problem all --route fd-central --min-time 0", tmp_path)
+    assert done.returncode == 2, "a start outside the domain is wrong before anything runs"
+    assert "outside, start: p_1 = -1 is outside 0 < p_1" in done.stderr.replace("box, start", "outside, start")
+    chosen = " ".join(f"--problem {name}" for name in ("raises", "no_problem", "make", "bar"))
+    done = routes(site, f"run --json {chosen} --route fd-central --min-time 0", tmp_path)
+    assert done.returncode == 1
+    rows = {row["problem"]: row for row in map(json.loads, done.stdout.splitlines())}
+    assert "cannot be built: ValueError: not today" in rows["raises"]["reason"]
+    assert "not a Problem" in rows["no_problem"]["reason"]
+    assert rows["bar"]["n_param"] == 8, "a built-in is not to be replaced"
+    assert rows["make"]["gradient"] == pytest.approx([6.0], rel=1e-8), "an integer start must not truncate steps"
+
+
+def test_the_list_shows_every_broken_entry(site: Path, tmp_path: Path) -> None:
+    done = routes(site, "list", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    for says in (
+        "exits' of evil cannot be imported: SystemExit: 3",
+        "'pi' of evil cannot be called",
+        "'misnamed' of evil calls itself 'adjoint'",
+        "hidden by the problem of the same name",
+        "d=0.5",
+    ):
+        assert says in done.stdout
+
+
+def test_huge_and_tiny_moduli_are_judged_or_refused(cli, tmp_path: Path) -> None:
+    """Squares of 1e-150 underflow; a gradient of zeros must not pass for right."""
+    command = [
+        "run",
+        "--json",
+        "--problem",
+        "bar[parametrization=raw]",
+        "--min-time",
+        "0",
+        "--no-store",
+        "--at",
+        "p.csv",
+    ]
+    (tmp_path / "p.csv").write_text("E\n" + "1e70\n" * 8)
+    rows = {r["route"]: r for r in cli(*command, "--route", "adjoint", "--route", "fd-central").rows}
+    assert rows["adjoint"]["gradient_error"] < 1e-14
+    assert rows["adjoint"]["gradient_norm"] > 0
+    assert rows["fd-central"]["gradient_error"] == pytest.approx(1.0)
+    (tmp_path / "p.csv").write_text("E\n" + "1e-30\n" * 8)
+    assert cli(*command, "--route", "complex-step").rows[0]["gradient_error"] < 1e-12
+    for value, status in (("1e-320", "not-converged"), ("1e-200", "non-finite")):
+        (tmp_path / "p.csv").write_text("E\n" + f"{value}\n" * 8)
+        ran = cli(*command, "--route", "adjoint")
+        assert (ran.code, ran.rows[0]["status"]) == (1, status)
+    (tmp_path / "p.csv").write_text("E\n" + "1e100\n" * 8)
+    assert "E_1 = 1e+100 is outside" in cli(*command, "--route", "adjoint").err
+
+
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [
+        ("routes run --problem bar --route adjoint > /dev/full", 2),
+        ("routes run --json --no-store --problem bar --route adjoint > /dev/full", 2),
+        ("routes list > /dev/full", 2),
+        ("routes run --problem bar --route adjoint >&-", 0),
+        ("routes run --problem 'bar[n=1|2]' --route adjoint 2>&-", 0),
+        ("PYTHONIOENCODING=ascii routes run --problem 'bar[data=é.csv]' --route adjoint", 2),
+        ("routes run --problem $'ba\\nr' --route adjoint", 2),
+        ("routes run --problem bar --route adjoint --store $(printf 'a%.0s' $(seq 300))", 2),
+        ("routes run --problem bar --route adjoint --store '' ", 2),
+        ("routes run --problem 'bar[n=1e12]' --route adjoint", 2),
+        ("routes run --problem 'bar[n=1_0]' --route adjoint", 2),
+        ("routes run --problem \"bar[sensors=$(printf '9%.0s' $(seq 5000))]\" --route adjoint", 2),
+    ],
+)
+def test_streams_and_names_at_their_limits(command: str, code: int, tmp_path: Path) -> None:
+    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, env=with_routes(), capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") <= 1
+    assert done.returncode == code
+
+
+def test_a_memory_store_is_a_file_like_any_other(cli, tmp_path: Path) -> None:
+    assert cli("run", "--problem", "bar", "--route", "adjoint", "--min-time", "0", "--store", ":memory:").code == 0
+    assert (tmp_path / ":memory:").stat().st_size > 0
+
+
+def test_an_export_never_overwrites_its_store(cli) -> None:
+    cli("run", "--problem", "bar", "--route", "adjoint", "--min-time", "0")
+    ran = cli("export", "-o", "results/routes.sqlite")
+    assert (ran.code, "the store itself" in ran.err) == (2, True)
+    assert cli("report").code == 0
+
+
+def test_a_store_that_locks_up_midway_loses_no_printed_row(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gradient_routes.bench.store.store import Store
+    from gradient_routes.problems.errors import InputError
+
+    def locked(self, *row) -> None:
+        raise InputError(f"store {self.path}: database is locked - try again later")
+
+    monkeypatch.setattr(Store, "append", locked)
+    ran = cli("run", "--json", "--problem", "bar[n=1|2|3]", "--route", "adjoint", "--min-time", "0")
+    assert len(ran.rows) == 3
+    assert ran.code == 2
+    assert "3 of 3 rows were not kept" in ran.err
+
+
+def test_a_foreign_store_is_left_alone(tmp_path: Path, cli) -> None:
+    with closing(sqlite3.connect(tmp_path / "foreign.sqlite")) as db:
+        db.execute("PRAGMA application_id = 77")
+    ran = cli("run", "--problem", "bar", "--route", "adjoint", "--store", "foreign.sqlite")
+    assert (ran.code, "another program" in ran.err) == (2, True)
+
+
+@pytest.mark.parametrize("columns", [20, 60, 80, 100])
+def test_no_terminal_is_too_narrow_for_the_numbers(columns: int, tmp_path: Path) -> None:
+    """On a narrow screen lines fold or wrap, but no unit and no column is cut off."""
+    import pty
+
+    leader, follower = pty.openpty()
+    command = [str(Path(sys.executable).with_name("routes")), "run", "--no-store", "--problem", "bar[n=8|1000]"]
+    child = subprocess.Popen(
+        [*command, "--route", "unrolled-ad[iterations=20]", "--route", "adjoint", "--min-time", "0"],
+        stdout=follower, stderr=subprocess.DEVNULL, cwd=tmp_path, env={**os.environ, "COLUMNS": str(columns)},
+    )  # fmt: skip
+    os.close(follower)
+    shown = b""
+    while True:
+        try:
+            more = os.read(leader, 65536)
+        except OSError:
+            break
+        if not more:
+            break
+        shown += more
+    child.wait()
+    os.close(leader)
+    text = shown.decode()
+    for word in ("problem", "memory", "tape", "closed", "adjoint"):
+        assert word in text
+    assert text.count("KiB") >= 2  # tapes
+    assert text.count("MiB") >= 2  # memory
+    assert "…" not in text
+
+
+def test_the_point_handed_to_routes_is_read_only() -> None:
+    from gradient_routes.bench.cases.case import problems
+    from gradient_routes.bench.cases.settings import Settings
+    from gradient_routes.bench.execution.case_context import Workbench
+
+    (spec,) = problems(["bar"])
+    p = Workbench(spec, Settings()).p
+    assert not p.flags.writeable
+    np.testing.assert_array_equal(p, np.zeros(8))
+
+
+def test_control_characters_of_others_reach_no_terminal(cli, tmp_path: Path) -> None:
+    """A store may come from anywhere; a name, a reason or a word of a process may hold what retitles a terminal."""
+    assert cli("run", "--problem", "bar[n=2]", "--route", "adjoint", "--min-time", "0").code == 0
+    wild = "a\x1b[31mb\x07\x9b2J"
+    with closing(sqlite3.connect(tmp_path / "results" / "routes.sqlite")) as db, db:
+        db.execute("UPDATE cases SET problem = ?, reason = ?, stderr = ?, status = 'crashed'", (wild, wild, wild))
+    for command in ("status", "report", "report --format md -o r.md", "compare results/routes.sqlite b\x1b[31m.json"):
+        ran = cli(*command.split())
+        said = ran.out + ran.err + ((tmp_path / "r.md").read_text() if "md" in command else "")
+        assert said.count("[31m") > 0, command
+        assert not [c for c in said if not c.isprintable() and c != "\n"], command

@@ -1,0 +1,165 @@
+"""Every verb under limits: it ends in one line with an exit code, and nothing that it started goes on."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from commands import FAULTY, Shell, ended, eventually, faulty
+
+from gradient_routes.bench.cli import KEEPING
+from gradient_routes.bench.execution import limited
+from gradient_routes.bench.execution.isolation import process as watching
+from gradient_routes.bench.execution.limited import FINISHED
+from gradient_routes.bench.store.store import Store
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+VERBS = {
+    "check": (f"{FAULTY}:Sleeping",),
+    "vcurve": ("--problem", faulty(does="sleep", when=0), "--route", "fd-central"),
+    "kink": ("--problem", faulty(does="sleep", when=0)),
+    "tolerance": ("--problem", faulty(does="sleep", when=0)),
+    "unrolling": ("--problem", faulty(does="sleep", when=0)),
+}
+
+
+def test_every_verb_ends_at_its_limit(started: Shell) -> None:
+    """In one line, with an exit code and a row that says so."""
+    running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
+    for verb, process in running.items():
+        ran = ended(process)
+        finished = f"; {FINISHED}" if verb in KEEPING else ""
+        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less{finished}\n"
+        assert (ran.code, ran.out, ran.err) == (1, "", says)
+    names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
+    kept = [dict(zip(names, row, strict=True)) for row in rows]
+    assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(VERBS, "timeout")
+    assert {row["reason"] for row in kept} == {"after 8 s of --timeout"}
+    started.nothing_is_left()
+
+
+COUNTED = """
+from gradient_routes.problems.bar import Bar
+
+class Counted(Bar):
+    def linearize(self, u, p):
+        with open("gradients", "a") as file:
+            file.write(".")
+        return super().linearize(u, p)
+"""
+ENDLESS = {
+    "invert": ("--optimizer", "descent", "--tolerance", "0", "--iterations", "100000"),
+    "tolerance": ("--route", "adjoint", "--tightest", "1e-12", "--per-decade", "1000", "--budget", "inf"),
+}
+
+
+@pytest.fixture
+def late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A limit that is met once there are some gradients, however long that takes."""
+    file = tmp_path / "gradients"
+
+    class Late:
+        @staticmethod
+        def monotonic() -> float:
+            return time.monotonic() + (7200.0 if file.exists() and len(file.read_text()) > 9 else 0.0)
+
+    for module in (limited, watching):
+        monkeypatch.setattr(module, "time", Late)
+
+
+@pytest.mark.parametrize("verb", ENDLESS)
+def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
+    verb: str, late: None, cli, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "counted.py").write_text(COUNTED)
+    ran = cli(verb, "--problem", "counted.py:Counted", "--json", "--isolate", *ENDLESS[verb])
+    told = f"{verb}: timeout: after 3600 s of --timeout - raise the limit, or ask for less; {FINISHED}"
+    assert (ran.code, ran.err) == (1, f"routes: {told}\n")
+    table = "inversion" if verb == "invert" else verb
+    kept = Store(tmp_path / "results" / "routes.sqlite").records(table)
+    shown = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert sum(row["table"] == table for row in shown) == len(kept) > 0
+    assert verb != "invert" or kept[-1]["says"] == "interrupted"
+
+
+@pytest.mark.parametrize(
+    ("given", "code", "says"),
+    [
+        (("check", f"{FAULTY}:Leaving"), 1, "check: crashed: its process ended with exit code 0"),
+        (("check", "--json", f"{FAULTY}:Chatty"), 0, "garbage of C"),
+        (("tolerance", "--problem", faulty(does="leave", when=0)), 1, "tolerance: crashed: its process ended with"),
+        (("tolerance", "--problem", faulty(does="quit", when=0)), 1, "routes: tolerance: SystemExit: 4 - see --debug"),
+        (("unrolling", "--problem", faulty(does="raise", when=0)), 1, "unrolling: ZeroDivisionError"),
+        (
+            ("vcurve", "--problem", faulty(does="take", when=0), "--route", "fd-central", "--memory", "300MB"),
+            1,
+            "vcurve: out-of-memory: MemoryError: Unable to allocate",
+        ),
+    ],
+)
+def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
+    started: Shell, given: tuple[str, ...], code: int, says: str
+) -> None:
+    """An exit code of 0 would mean that a gradient agrees."""
+    ran = started.run(*given, "--no-store")
+    assert ran.code == code, ran.err
+    assert says in ran.err
+    assert "Traceback" not in ran.err
+    if code == 0:
+        assert json.loads(ran.out)["verdict"] == "agrees", "what C prints is no result"
+    else:
+        assert ran.out == ""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("model", ["Sleeping", "Stubborn"])
+def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str) -> None:
+    process = started.start("check", f"{FAULTY}:{model}")
+    started.asleep()
+    process.send_signal(signal.Signals[name])
+    ran = ended(process)
+    assert (ran.code, ran.out, ran.err) == (130, "", "routes: interrupted - nothing is kept\n")
+    started.nothing_is_left()
+    assert not (started.folder / "results" / "routes.sqlite").exists()
+
+
+DEAF = """
+import os, signal, time
+
+class Deaf(Counted):
+    def linearize(self, u, p):
+        if os.path.exists("gradients") and os.path.getsize("gradients") > 9:
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+            time.sleep(987)
+        return super().linearize(u, p)
+"""
+
+
+def test_a_verb_that_does_not_react_is_killed_and_says_nothing_of_what_it_has(
+    late: None, cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "deaf.py").write_text(COUNTED + DEAF)
+    monkeypatch.setattr(limited, "LAST", 0.5)
+    ran = cli("invert", "--problem", "deaf.py:Deaf", "--isolate", "--no-plot", *ENDLESS["invert"])
+    told = "invert: timeout: after 3600 s of --timeout - raise the limit, or ask for less"
+    assert (ran.code, ran.err) == (1, f"routes: {told}\n")
+    assert not Store(tmp_path / "results" / "routes.sqlite").records("inversion")
+
+
+def test_a_group_that_is_told_to_end_keeps_what_it_has(started: Shell) -> None:
+    """Service managers tell all processes at once: the one inside by itself, and by the one that watches it."""
+    (started.folder / "counted.py").write_text(COUNTED)
+    process = started.start("invert", "--problem", "counted.py:Counted", "--no-plot", *ENDLESS["invert"])
+    gradients = started.folder / "gradients"
+    eventually(lambda: gradients.exists() and len(gradients.read_text()) > 9)
+    for each in started.alive():
+        each.send_signal(signal.SIGTERM)
+    ran = ended(process)
+    assert (ran.code, ran.err) == (130, f"routes: interrupted - {FINISHED}\n")
+    assert Store(started.folder / "results" / "routes.sqlite").records("inversion")
+    started.nothing_is_left()

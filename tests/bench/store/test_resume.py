@@ -1,0 +1,255 @@
+"""Cases by what their answers rest on: what is missing, failed or stale is run again, and nothing else is."""
+
+from __future__ import annotations
+
+import json
+import random
+import sqlite3
+import subprocess
+from collections import Counter
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from commands import Ran, shell, with_routes
+
+from benchmarks.killing import Killing, killing, sound
+from gradient_routes.bench.cases import environment, keys, sources
+from gradient_routes.bench.cases.row import STATUSES, empty_row
+from gradient_routes.bench.store.resume import state_of
+from gradient_routes.bench.store.store import Store
+
+MODEL = '''
+from pathlib import Path
+import numpy as np
+from gradient_routes.problems.problem import Offers, Parameters, Problem
+from power import POWER
+
+class Model(Problem):
+    """J = sum p^POWER, once the file says so."""
+
+    name = "model"
+    offers = Offers.VALUE
+
+    def __init__(self, *, n: int = 2, data: str = "data.csv", fails: bool = False) -> None:
+        self.fails = fails
+        self.parameters = Parameters(start=np.ones(n) * float(Path(data).read_text()), scale=np.ones(n))
+
+    def value(self, p):
+        return 1 / 0 if self.fails else float((p**POWER).sum())
+'''
+
+
+@pytest.fixture
+def plugin(tmp_path: Path) -> Path:
+    """A problem in a file, what it imports from beside, the data it reads, and what it has nothing to do with."""
+    (tmp_path / "model.py").write_text(MODEL)
+    (tmp_path / "power.py").write_text("POWER = 2\n")
+    (tmp_path / "data.csv").write_text("1\n")
+    (tmp_path / "other.py").write_text("OTHER = 1\n")
+    return tmp_path
+
+
+def routes(folder: Path, *arguments: str, before: str = "") -> Ran:
+    command = ["bash", "-c", f'{before}exec routes run --no-isolate --min-time 0 --json "$@"', "routes", *arguments]
+    done = subprocess.run(command, cwd=folder, env=with_routes(), capture_output=True, text=True, timeout=120)
+    return Ran(done.returncode, done.stdout, done.stderr)
+
+
+def ran(folder: Path, *arguments: str) -> list[str]:
+    """Which cases were run again, by route and n."""
+    options = ("--problem", "model.py:Model[n=2|3]", "--route", "fd-central", "--route", "fd-one-sided")
+    done = routes(folder, *options, *arguments)
+    assert done.code == 0, done.err
+    return sorted(f"{row['route']} {row['n_param']}" for row in done.rows)
+
+
+CASE = ("run", "--json", "--min-time", "0", "--problem", "model.py:Model", "--route", "fd-central")
+ALL = ["fd-central 2", "fd-central 3", "fd-one-sided 2", "fd-one-sided 3"]
+
+
+def test_an_answer_is_stale_once_anything_that_it_rests_on_has_changed(plugin: Path) -> None:
+    assert ran(plugin) == ALL
+    assert ran(plugin, "--resume") == []
+    (plugin / "other.py").write_text("OTHER = 2\n")
+    (plugin / "README").write_text("of no consequence")
+    (plugin / "model.py").touch()
+    assert ran(plugin, "--resume") == [], "what it does not import is nothing to it, nor is a date"
+    (plugin / "model.py").write_text(MODEL.replace("float((", "float(3 * ("))
+    assert ran(plugin, "--only", "missing") == ran(plugin, "--only", "failed") == []
+    assert ran(plugin, "--resume") == ALL
+    (plugin / "power.py").write_text("POWER = 3\n")
+    assert ran(plugin, "--only", "stale") == ALL
+    assert ran(plugin, "--only", "stale") == []
+    (plugin / "data.csv").write_text("2\n")
+    assert ran(plugin, "--only", "all", "--problem", "model.py:Model[n=2]") == ALL
+    assert ran(plugin, "--resume") == []
+    assert len(Store(plugin / "results" / "routes.sqlite").rows()) == 16, "nothing is replaced"
+
+
+def test_what_is_missing_or_failed_is_run_and_told_from_what_is_done(plugin: Path, cli) -> None:
+    sweep = (*CASE, "--problem", "model.py:Model[fails=true]")
+    assert cli(*CASE).code == 0
+    told = {}
+    for only in ("failed", "missing", "missing", "failed", "stale", "all"):
+        done = cli(*sweep, "--only", only)
+        told.setdefault(only, []).append([row["problem_options"]["fails"] for row in done.rows])
+        assert f"{len(done.rows)} of 2 cases run" in done.err
+    assert told == {"failed": [[], [True]], "missing": [[True], []], "stale": [[]], "all": [[False, True]]}
+    assert [row["status"] for row in cli(*sweep, "--resume").rows] == ["failed"], "what failed is no answer"
+
+
+def test_other_settings_are_another_case(plugin: Path, cli) -> None:
+    for given, count in (
+        ((), 1), ((), 0), (("--rtol", "1e-9"), 1), (("--no-timing",), 1), (("--threads", "2"), 1),
+        (("--budget", "1"), 0), (("--min-time", "0.01"), 0),
+        (("--components", "1"), 1), (("--components", "1", "--seed", "1"), 1),
+    ):  # fmt: skip
+        assert len(cli(*CASE, "--resume", *given).rows) == count, given
+
+
+def test_what_was_too_dear_waits_for_a_larger_budget(plugin: Path, cli) -> None:
+    for budget, statuses in (("1e-9", ["skipped"]), ("1e-9", []), ("1e-10", []), ("inf", ["ok"]), ("1e-9", [])):
+        assert [row["status"] for row in cli(*CASE, "--resume", "--budget", budget).rows] == statuses
+
+
+def kept(**values: object) -> dict:
+    return empty_row() | {"status": "ok", "content_key": "a", "budget_s": 60.0} | values
+
+
+def test_states() -> None:
+    row = kept()
+    assert state_of(row, None) == "missing"
+    assert state_of(row, kept(content_key="b")) == "stale"
+    states = {status: state_of(row, kept(status=status)) for status in STATUSES}
+    assert states == dict.fromkeys(STATUSES, "failed") | {"ok": "done", "skipped": "done", "pruned": "missing"}
+    assert state_of(row, kept(status="crashed"), expected=lambda kept: True) == "done"
+    assert state_of(row, kept(status="crashed", content_key="b"), expected=lambda kept: True) == "stale"
+    for before, now, state in (
+        (60.0, 61.0, "missing"),
+        (60.0, None, "missing"),
+        (60.0, 60.0, "done"),
+        (None, 5, "done"),
+    ):
+        assert state_of(kept(budget_s=now), kept(status="skipped", budget_s=before)) == state
+
+
+def content(monkeypatch: pytest.MonkeyPatch, **changed: object) -> str:
+    from gradient_routes.bench.cases import case
+    from gradient_routes.bench.cases.settings import Settings
+
+    for name, value in changed.items():
+        monkeypatch.setattr(keys, name, value)
+    (problem,), (route,) = case.problems(["bar"]), case.routes(["adjoint"])
+    return keys.identified(kept(at="start"), problem, route, Settings(), 1)["content_key"]
+
+
+def test_versions_of_libraries_and_of_the_harness_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = content(monkeypatch)
+    assert content(monkeypatch) == before
+    newer = environment.versions() | {"scipy": "99.0"}
+    assert content(monkeypatch, versions=lambda: newer) != before
+    assert content(monkeypatch, versions=environment.versions) == before
+    assert content(monkeypatch, HARNESS=keys.HARNESS + 1) != before
+
+
+def test_the_source_of_a_problem_is_all_that_it_imports_of_its_own() -> None:
+    found = {
+        path.relative_to(sources.HERE)
+        for path in sources.closure(sources.HERE / "problems" / "bar.py", sources.HERE, "problems")
+    }
+    names = {str(path) for path in found}
+    assert {"problems/bar.py", "problems/problem.py", "problems/matrices/tridiagonal.py"} <= names
+    assert not any(name.startswith("bench/") for name in names), "the harness has a number of its own"
+    assert "problems/fem/assembly_jax.py" not in names
+
+
+def test_relative_imports_and_packages_are_followed(tmp_path: Path) -> None:
+    for path, text in {
+        "own/__init__.py": "from . import a", "own/a.py": "from .b import c\nimport numpy",
+        "own/b.py": "def f(): import own.d", "own/d.py": "", "own/e.py": "", "other.py": "",
+    }.items():  # fmt: skip
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).write_text(text)
+    found = sources.closure(tmp_path / "own" / "a.py", tmp_path, "own")
+    assert {str(path.relative_to(tmp_path)) for path in found} >= {"own/a.py", "own/b.py", "own/d.py"}
+    assert not {"own/e.py", "other.py"} & {str(path.relative_to(tmp_path)) for path in found}
+
+
+def test_two_runners_of_one_sweep_lose_no_row(plugin: Path) -> None:
+    command = ["routes", "run", "--no-isolate", "--min-time", "0", "--json", "--resume", "--route", "fd-central"]
+    command += ["--problem", "model.py:Model[n=1|2|3|4|5|6|7|8|9|10]"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    runners = [subprocess.Popen(command, cwd=plugin, env=with_routes(), **pipes) for _ in range(3)]
+    printed = [Ran(runner.wait(), *out) for runner, out in [(r, r.communicate(timeout=120)) for r in runners]]
+    assert [done.code for done in printed] == [0, 0, 0], [done.err for done in printed]
+    rows = Store(plugin / "results" / "routes.sqlite").rows()
+    every = [(row["case_key"], row["started"]) for done in printed for row in done.rows]
+    assert Counter((row["case_key"], row["started"]) for row in rows) == Counter(every)
+    assert len({row["case_key"] for row in rows}) == 10
+
+
+def test_a_full_disk_loses_no_printed_row_and_harms_no_store(plugin: Path) -> None:
+    sizes = [*range(50, 60)]
+    sweep = ("--problem", f"model.py:Model[n={'|'.join(map(str, sizes))}]", "--route", "fd-central", "--resume")
+    assert routes(plugin, "--problem", "model.py:Model[n=50]", "--route", "fd-central").code == 0
+    store = Store(plugin / "results" / "routes.sqlite")
+    before, blocks = store.rows(), store.path.stat().st_size // 1024
+    full = routes(plugin, *sweep, before=f"ulimit -f {blocks}; ")
+    assert full.code == 2
+    assert [row["n_param"] for row in full.rows] == sizes[1:], "what is measured is printed"
+    assert full.err.count("\n") == 2
+    assert "rows were not kept: store" in full.err
+    assert sound(store.path)
+    assert store.rows()[0] == before[0]
+    lost = len(sizes) - len(store.rows())
+    assert f"{lost} of 9 rows were not kept" in full.err
+    assert len(routes(plugin, *sweep).rows) == lost > 0
+    assert len(store.rows()) == len(sizes)
+
+
+def test_a_sweep_killed_again_and_again_loses_nothing_and_repeats_nothing(tmp_path: Path) -> None:
+    """The full size is `python -m benchmarks.killing`."""
+    store = tmp_path / "s.sqlite"
+    found = killing(store, cases=12, kills=6, rng=random.Random(1), isolated=0.3)
+    assert (found.lost, found.repeated, found.left) == (0, 0, 0)
+    assert found.kills > 0
+    assert sound(store)
+    assert len({row["case_key"] for row in Store(store).rows()}) == 12
+
+
+def test_killings_add_up() -> None:
+    one, other = Killing(kills=2, runs=3, printed=[{}]), Killing(kills=1, lost=1)
+    assert str(one + other) == "3 kills, 1 lost, 0 repeated, 0 left running"
+
+
+def test_a_row_of_an_older_schema_is_missing(plugin: Path) -> None:
+    """It has no key: what it was an answer to is not known."""
+    assert ran(plugin) == ALL
+    with closing(sqlite3.connect(plugin / "results" / "routes.sqlite")) as db:
+        for statement in ("DROP INDEX by_case", "ALTER TABLE cases DROP COLUMN case_key", "PRAGMA user_version = 3"):
+            db.execute(statement)
+        db.commit()
+    assert ran(plugin, "--resume") == ALL
+    assert ran(plugin, "--resume") == []
+
+
+WATCH = """from pathlib import Path
+import model
+
+
+class Model(model.Model):
+    def value(self, p):
+        here = Path(__file__)
+        here.write_text(here.read_text() + "#")
+        return super().value(p)
+"""
+
+
+def test_a_source_that_changes_while_it_runs_gives_no_row_under_its_old_name(plugin: Path) -> None:
+    """What ran of the other code is no answer of this one."""
+    (plugin / "watch.py").write_text(WATCH)
+    done = shell("routes run --json --no-timing --problem watch.py:Model --route fd-central", plugin)
+    row = json.loads(done.stdout)
+    assert row["status"] == "failed"
+    assert "watch.py has changed since the run began - run it again" in row["reason"]

@@ -1,0 +1,187 @@
+"""Unrolled AD: the gradient of the k-th iterate, its tape, and no NaN beyond convergence."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from conftest import relative_error, somewhere
+
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.block import Block
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.jax64 import jax
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.implicit_ad import implicit_ad
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.solvers.traced_iterations import iteration, solution
+from gradient_routes.routes.unrolled_ad import KEPT, unrolled_ad
+
+INNER = tuple(KEPT)
+OPEN = unrolled_ad.defaults
+
+
+@pytest.mark.parametrize("k", [1, 3, 6])
+@pytest.mark.parametrize("inner", INNER)
+def test_it_is_the_gradient_of_the_kth_iterate(inner: str, k: int) -> None:
+    """Equal to central differences of the k-step objective, and not the gradient of the solution."""
+    bar = Bar(n=6, sensors=6)
+    p = somewhere(bar)
+    traced, zero = bar.traced(), np.zeros(6)
+    iterate = iteration(inner, traced)
+    result = unrolled_ad.prepare(Model(bar), p, inner=inner, iterations=k)(p)
+
+    @jax.jit
+    def compiled(p: np.ndarray) -> jax.Array:
+        return traced.objective(solution(iterate, zero, p, 1, k), p)
+
+    def J_k(p: np.ndarray) -> float:
+        return float(compiled(p))
+
+    h = 1e-5
+    fd = np.array([(J_k(p + h * e) - J_k(p - h * e)) / (2 * h) for e in np.eye(6)])
+    assert relative_error(result.gradient, fd) < 1e-7  # h^2, and eps J / h
+    assert result.J == pytest.approx(J_k(p), rel=1e-12)
+    converged = inner == "cg" and k == 6  # conjugate gradients end after n_u steps
+    assert (relative_error(result.gradient, bar.reference(p).gradient) < 1e-9) == converged
+    assert (result.residual < 1e-10) == converged
+
+
+@pytest.mark.parametrize("inner", INNER)
+def test_the_iterate_is_the_textbook_one(inner: str) -> None:
+    bar = Bar(n=5, sensors=5)
+    p = somewhere(bar)
+    K = np.column_stack([bar.tangent(p, p) @ e for e in np.eye(5)])
+    u, r, d = np.zeros(5), bar.f.copy(), bar.f.copy()
+    for _ in range(3):
+        if inner == "cg":
+            alpha = r @ r / (d @ K @ d)
+            u, r_next = u + alpha * d, r - alpha * K @ d
+            d, r = r_next + (r_next @ r_next) / (r @ r) * d, r_next
+        else:
+            w = 1 / np.diag(K) if inner == "jacobi" else 1 / float(bar.traced().spectral_bound(p))
+            u = u + w * (bar.f - K @ u)
+    np.testing.assert_allclose(iteration(inner, bar.traced()).iterate((np.zeros(5), p), 3), u, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("beyond", [1, 2, 10, 200])
+@pytest.mark.parametrize("start", ["start", "somewhere"])
+def test_conjugate_gradients_stand_still_after_convergence(start: str, beyond: int) -> None:
+    bar = Bar(n=8)
+    p = bar.parameters.start if start == "start" else somewhere(bar)
+    result = unrolled_ad.prepare(Model(bar), p, inner="cg", iterations=8 + beyond)(p)
+    assert relative_error(result.gradient, bar.reference(p).gradient) < 1e-10
+
+
+@pytest.mark.parametrize("inner", INNER)
+def test_default_iterations_are_what_the_tolerance_needs(inner: str) -> None:
+    bar = Bar(n=6)
+    p, model = somewhere(bar), Model(bar)
+    k = unrolled_ad.resolve(model, p, **OPEN | {"inner": inner})["iterations"]
+    enough = unrolled_ad.prepare(model, p, inner=inner, iterations=k)(p)
+    short = unrolled_ad.prepare(model, p, inner=inner, iterations=k - 1)(p)
+    assert enough.residual <= 2 * model.solver.rtol < 20 * short.residual  # 2: the residual carried along drifts
+    assert short.residual > model.solver.rtol
+    expected = unrolled_ad.expect(model, p, **OPEN | {"inner": inner})["iterations"]
+    assert k / 5 < expected < 5 * k  # an estimate for a bill: Jacobi hardly feels the contrast it includes
+
+
+@pytest.mark.parametrize("checkpoint", [None, 10])
+@pytest.mark.parametrize("inner", INNER)
+def test_the_tape_is_as_large_as_declared(inner: str, checkpoint: int | None) -> None:
+    bar = Bar(n=500)
+    p, options = bar.parameters.start, {"inner": inner, "checkpoint": checkpoint}
+    tapes = [unrolled_ad.prepare(Model(bar), p, iterations=k, **options)(p).tape for k in (20, 40)]
+    declared = unrolled_ad.tape(bar, iterations=20, newton=1, **options)
+    assert tapes[1] - tapes[0] == declared  # bytes of 20 iterations, exactly; the rest does not grow
+    assert tapes[0] - declared < 10 * 8 * 500
+
+
+@cache
+def after_30_iterations(inner: str, checkpoint: int | None) -> tuple[Array, int]:
+    """The gradient and the products it took."""
+    bar = Bar(n=40)
+    model, p = Model(bar), somewhere(bar)
+    g = unrolled_ad.prepare(model, p, inner=inner, iterations=30, newton=1, checkpoint=checkpoint)(p).gradient
+    return g, model.tally.work.matvecs
+
+
+@pytest.mark.parametrize("checkpoint", [1, 4, 7, 30])
+@pytest.mark.parametrize("inner", INNER)
+def test_checkpoints_change_the_bill_and_not_the_gradient(inner: str, checkpoint: int) -> None:
+    """30 iterations: multiples of the distance, a remainder, one checkpoint only."""
+    (whole, _), (g, products) = after_30_iterations(inner, None), after_30_iterations(inner, checkpoint)
+    np.testing.assert_allclose(g, whole, rtol=1e-9, atol=1e-12 * abs(whole).max())
+    assert products == 60 + 30 - 30 % checkpoint
+
+
+@pytest.mark.parametrize(("newton", "k"), [(1, 4), (2, 3)])
+def test_conjugate_gradients_inside_newton_give_the_gradient_of_their_iterate(newton: int, k: int) -> None:
+    """Equal to central differences of the same few iterations, far from the solution."""
+    block = Block(n=2)
+    p, traced = block.parameters.start, block.traced()
+    iterate, u_0 = iteration("cg", traced), np.zeros(block.n_state)
+    result = unrolled_ad.prepare(Model(block), p, inner="cg", iterations=k, newton=newton)(p)
+
+    @jax.jit
+    def J_k(p: np.ndarray) -> jax.Array:
+        return traced.objective(solution(iterate, u_0, p, newton, k), p)
+
+    h = 1e-5
+    fd = np.array([float(J_k(p + h * e) - J_k(p - h * e)) / (2 * h) for e in np.eye(len(p))])
+    assert relative_error(result.gradient, fd) < 1e-7  # h^2, and eps J / h
+    assert relative_error(result.gradient, implicit_ad.prepare(Model(block), p)(p).gradient) > 1e-3
+
+
+def test_converged_conjugate_gradients_inside_newton_give_the_gradient_of_the_solution() -> None:
+    block = Block(n=2)
+    p, model = block.parameters.start, Model(block)
+    options = unrolled_ad.resolve(model, p, **OPEN | {"inner": "cg"})
+    assert options["newton"] == model.solve(p).work.newton_iterations
+    result = unrolled_ad.prepare(model, p, **options)(p)
+    assert relative_error(result.gradient, implicit_ad.prepare(Model(block), p)(p).gradient) < 1e-9
+    each = (result.tape - unrolled_ad.prepare(model, p, **options | {"iterations": 10})(p).tape) / (
+        unrolled_ad.tape(block, **options) - unrolled_ad.tape(block, **options | {"iterations": 10})
+    )
+    assert each == 1.0
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_the_newton_loop_gives_the_gradient_of_the_kth_newton_iterate(k: int) -> None:
+    """Equal to a complex step through k Newton steps written here, and not the gradient of the solution."""
+    block = Block(n=2)
+    p = block.parameters.start
+    result = unrolled_ad.prepare(Model(block), p, inner="direct", iterations=k)(p)
+
+    def u_k(q: np.ndarray) -> np.ndarray:
+        u = block.initial(q)
+        for _ in range(k):
+            u = u - np.linalg.solve(block.tangent(u, q).full().toarray(), block.residual(u, q))
+        return u
+
+    h = 1e-30
+    steps = [p + 1j * h * e for e in np.eye(len(p))]
+    exact = np.array([block.objective(u_k(q), q).imag / h for q in steps])
+    assert relative_error(result.gradient, exact) < 1e-11  # cond(R_u) eps of two solvers
+    solution = implicit_ad.prepare(Model(block), p)(p).gradient
+    assert relative_error(result.gradient, solution) > (1e-3, 1e-5, 1e-9)[k - 1]
+
+
+def test_the_tape_of_the_newton_loop_holds_the_factors_of_every_step() -> None:
+    block = Block(n=2)
+    p, model = block.parameters.start, Model(block)
+    tapes = [unrolled_ad.prepare(model, p, inner="direct", iterations=k)(p).tape for k in (2, 4)]
+    factors = model.solve(p).factors.nbytes
+    arrays = 8 * (2 * block.n_state + len(p))  # u, du and p of a step
+    assert tapes[1] - tapes[0] == pytest.approx(2 * (factors + arrays), rel=0.1)  # p is shared, u counted once
+
+
+def test_wrong_iterations_are_wrong_usage() -> None:
+    for k in (0, -5):
+        with pytest.raises(InputError, match="choose at least 1"):
+            unrolled_ad.check(inner="cg", iterations=k, newton=None, checkpoint=None)
+        with pytest.raises(InputError, match="choose at least 1"):
+            unrolled_ad.check(inner="cg", iterations=None, newton=None, checkpoint=k)
+    with pytest.raises(InputError, match="inner=direct"):
+        unrolled_ad.check(inner="direct", iterations=None, newton=None, checkpoint=2)
