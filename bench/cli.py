@@ -64,7 +64,7 @@ class Routes(click.Group):
             complain(f"{error.strerror or error} - check where the output goes")
             ctx.exit(WRONG_USAGE)
         except (Exception, SystemExit) as failure:  # what code of others may leave by
-            from gradient_routes.bench.cases.outcome import one_line, status_of
+            from gradient_routes.bench.cases.status import one_line, status_of
 
             if debugging():
                 traceback.print_exc()

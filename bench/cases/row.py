@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.routes.tally import KINDS
 
 Row = dict[str, Any]
@@ -26,9 +27,9 @@ class Column:
 
 
 # settled by an answer; by a limit of the case or of the machine; by an error in what was run
-ANSWERED = ("ok", "skipped", "pruned")
-LIMITED = ("timeout", "out-of-memory")
-WRONG = ("not-converged", "non-finite", "failed", "crashed")
+ANSWERED = (Status.OK, Status.SKIPPED, Status.PRUNED)
+LIMITED = (Status.TIMEOUT, Status.OUT_OF_MEMORY)
+WRONG = (Status.NOT_CONVERGED, Status.NON_FINITE, Status.FAILED, Status.CRASHED)
 STATUSES = (*ANSWERED, *LIMITED, *WRONG)
 
 COLUMNS = (

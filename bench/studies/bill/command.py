@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
@@ -24,8 +23,7 @@ from gradient_routes.bench.command_options import (
     solver_options,
     store_options,
 )
-from gradient_routes.bench.execution.limited import limit_options
-from gradient_routes.bench.execution.options import executor_options
+from gradient_routes.bench.execution.options import executor_options, limit_options
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -104,7 +102,7 @@ def run(
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.partial import chosen
     from gradient_routes.bench.cases.settings import Settings
-    from gradient_routes.bench.execution.executors.interrupt import Interrupt
+    from gradient_routes.bench.execution.isolation.signals import Interrupt, interruptible
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.store import Store
     from gradient_routes.bench.studies.bill.files import Files
@@ -127,7 +125,7 @@ def run(
         store.check_writable()
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
     done = Done(store, as_json, known, views=gradient is not None or vtu is not None)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
+    interruptible()  # SIGTERM ends it like Ctrl-C: with a table
     try:
         with closing(outcomes):  # whatever interrupts, cases under way are ended first
             for outcome in with_progress(outcomes, count):

@@ -79,7 +79,7 @@ class Run:
         """All of them, or those before an interrupt or a failure, which the verb ends with. Raises either where it has
         none.
         """
-        from gradient_routes.bench.cases.outcome import FOREIGN
+        from gradient_routes.bench.cases.status import FOREIGN
 
         done: list[Found] = []
         try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +21,7 @@ from gradient_routes.bench.command_options import (
     solver_options,
     store_options,
 )
-from gradient_routes.bench.execution.limited import limit_options, pin
+from gradient_routes.bench.execution.options import limit_options
 from gradient_routes.bench.studies.study import echo_json, json_option, keep, no_plot_option, writable
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError, RoutesError
@@ -88,6 +87,7 @@ def scaling(
     """
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.settings import Settings
+    from gradient_routes.bench.execution.isolation.signals import interruptible
     from gradient_routes.bench.execution.sweep import How, run
     from gradient_routes.bench.studies.scaling import measure as study
     from gradient_routes.bench.studies.scaling import view
@@ -103,9 +103,9 @@ def scaling(
     for left_out in case.left_out([], routes):
         complain(f"left out of 'all': {left_out}")
     lost: list[str] = []
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with tables
+    interruptible()  # SIGTERM ends it like Ctrl-C: with tables
     if not isolate:
-        pin(limits)
+        limits.pin()
     measure = partial(run, how=How(isolate, limits))
     race = partial(apart, break_even, limits) if isolate else break_even
     done = study.scaling(asked, specs, settings, keeping(kept, lost), measure, race)

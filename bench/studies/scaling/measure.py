@@ -13,7 +13,7 @@ from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution.executors.interrupt import Interrupt
+from gradient_routes.bench.execution.isolation.signals import Interrupt
 from gradient_routes.bench.execution.sweep import run
 from gradient_routes.bench.studies.scaling.break_even import BreakEven, Racing, break_even
 from gradient_routes.bench.studies.scaling.climbing import Climb, Measure, Series

@@ -1,0 +1,116 @@
+"""What a job says while it runs, and what it is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from gradient_routes.bench.cases.status import Status
+
+if TYPE_CHECKING:
+    from gradient_routes.bench.cases.environment import Environment
+    from gradient_routes.bench.cases.outcome import Outcome
+    from gradient_routes.bench.cases.row import Row
+    from gradient_routes.bench.execution.references import Found
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A row of a study's table, complete."""
+
+    table: str
+    row: Row
+
+
+@dataclass(frozen=True)
+class Note:
+    """A line for the user: a remark, or progress."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Returned:
+    """The value of a function, or one of several values."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A case has begun, in this environment."""
+
+    environment: Environment
+
+
+@dataclass(frozen=True)
+class Known:
+    """The phase of a case that begins, and its row so far."""
+
+    phase: str
+    row: Row
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A case is ready to be timed, in turns; `long` where one call takes so long that no other case should wait.
+
+    `found` are the references it has found.
+    """
+
+    long: bool
+    found: Found
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A turn of timing is over; whether the case needs more of them."""
+
+    more: bool
+
+
+@dataclass(frozen=True)
+class Done:
+    """The outcome of a case, and the references it has found."""
+
+    outcome: Outcome
+    found: Found
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The last message: how the job ended.
+
+    reason     what happened, with numbers
+    stderr     last lines of what its process wrote to stderr
+    traceback  of the exception that ended it
+    killed     the process did not end by itself: what it had not said by then is lost
+    """
+
+    status: Status
+    reason: str = ""
+    stderr: str = ""
+    traceback: str = ""
+    killed: bool = False
+
+    def line(self, who: str) -> str:
+        """For the user: who, what happened, what to do."""
+        return f"{who}: {self.status}: {self.reason} - {self.status.todo}" if self.status.todo else self.reason
+
+
+Message = Kept | Note | Returned | Begun | Known | Ready | Turned | Done | Ended
+
+
+@dataclass(frozen=True)
+class Turn:
+    """To a case that is ready: time it for a while."""
+
+
+@dataclass(frozen=True)
+class Finish:
+    """To a case that is ready: give the outcome, timed beside so many cases."""
+
+    interleaved: int
+
+
+Order = Turn | Finish
