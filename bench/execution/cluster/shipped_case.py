@@ -12,7 +12,7 @@ from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-    from gradient_routes.bench.cases.row import Row
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.execution.references import Found
     from gradient_routes.bench.execution.worker import Channel, Measure
 

@@ -15,9 +15,9 @@ from multiprocessing import Pipe
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
 from gradient_routes.bench.cases.outcome import Outcome, refused
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.execution.cluster.shipped_case import Sealed
 from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.limits import Limits
