@@ -11,20 +11,13 @@ from typing import Any, NoReturn
 
 import click
 
+from gradient_routes.bench.cases import registry
 from gradient_routes.bench.command_options import complain, debug_option, debugging, store_option
 from gradient_routes.bench.commands.compare import baseline, compare
 from gradient_routes.bench.commands.report import report
 from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.execution.limited import FINISHED, Inside
-from gradient_routes.bench.studies.bill.command import run
-from gradient_routes.bench.studies.check.command import check
-from gradient_routes.bench.studies.identify.command import identify
-from gradient_routes.bench.studies.invert.command import invert
-from gradient_routes.bench.studies.kink.command import kink
-from gradient_routes.bench.studies.scaling.command import scaling
-from gradient_routes.bench.studies.tolerance.command import tolerance
-from gradient_routes.bench.studies.unrolling.command import unrolling
-from gradient_routes.bench.studies.vcurve.command import vcurve
+from gradient_routes.bench.studies.command import command_of
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
@@ -108,11 +101,9 @@ def main() -> None:
     """
 
 
-main.add_command(run)
+for _study in registry.studies().values():
+    main.add_command(command_of(_study))
 main.add_command(status)
-main.add_command(vcurve)
-main.add_command(check)
-main.add_command(kink)
 
 
 @main.command("list")
@@ -146,10 +137,5 @@ def export(table: str, format: str | None, output: Path | None, store: Path) -> 
 
 
 main.add_command(report)
-main.add_command(tolerance)
-main.add_command(unrolling)
-main.add_command(scaling)
-main.add_command(invert)
 main.add_command(compare)
 main.add_command(baseline)
-main.add_command(identify)

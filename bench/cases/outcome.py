@@ -5,8 +5,8 @@ from __future__ import annotations
 import traceback
 from dataclasses import dataclass
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.cases.status import Status, one_line, reason_of, status_of
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError

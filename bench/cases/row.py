@@ -4,27 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.routes.tally import KINDS
-
-Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of the table `cases`. `type` is SQLite's; JSON columns hold text there and objects in --json."""
-
-    name: str
-    type: str
-    unit: str
-    meaning: str
-    json: bool = False
-
 
 # settled by an answer; by a limit of the case or of the machine; by an error in what was run
 ANSWERED = (Status.OK, Status.SKIPPED, Status.PRUNED)

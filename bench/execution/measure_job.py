@@ -11,7 +11,7 @@ from gradient_routes.bench.execution.isolation.messages import Begun, Done, Know
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-    from gradient_routes.bench.cases.row import Row
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.settings import Settings
     from gradient_routes.bench.cases.sources import Stamp
     from gradient_routes.bench.execution.references import Found

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import environment
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.outcome import Outcome, failed, note
-from gradient_routes.bench.cases.row import Row, empty_row
+from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite
 from gradient_routes.bench.execution.case_context import Workbench

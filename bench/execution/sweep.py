@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.keys import identified, witnesses
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.measure_job import Measure

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.environment import Environment, fingerprint
-from gradient_routes.bench.cases.row import COLUMNS, Column, Row, clean
+from gradient_routes.bench.cases.row import COLUMNS, clean
 from gradient_routes.bench.regression.measured import KEPT, Case, Measured, Verdict, of_store
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError

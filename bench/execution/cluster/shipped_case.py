@@ -13,7 +13,7 @@ from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-    from gradient_routes.bench.cases.row import Row
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.execution.isolation.channel import Channel
     from gradient_routes.bench.execution.measure_job import Measure
     from gradient_routes.bench.execution.references import Found

@@ -7,9 +7,9 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
 from gradient_routes.bench.cases.outcome import Outcome, refused
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.cluster.shipped_case import Sealed
 from gradient_routes.bench.execution.executors.running import alone

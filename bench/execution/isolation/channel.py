@@ -11,6 +11,8 @@ from gradient_routes.bench.cases.status import FOREIGN, Status, one_line, reason
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Order, Returned
 from gradient_routes.problems.errors import DomainError, InputError
 
+SAID = "said"  # goes with every message from one process to the other, to tell it from garbage
+
 
 def no_orders() -> Order:
     raise EOFError("this job is given no orders")

@@ -17,7 +17,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from gradient_routes.bench.cases.status import Status
-from gradient_routes.bench.execution.isolation.channel import Job
+from gradient_routes.bench.execution.isolation.channel import SAID, Job
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Order
 from gradient_routes.bench.execution.isolation.process import STACK, Confined, Killed
@@ -72,10 +72,10 @@ class Line:
         if self._ended is None:
             if isinstance(self._message, Ended):
                 self._ended = self._message
-            elif isinstance(self._message, Message):
-                return self._message
-            else:
+            elif self._message is None:
                 self._ended = self.process.ending()
+            else:
+                return self._message
         self.close()  # now all it has said has come, and all of its stderr
         return self._rest()
 
@@ -108,16 +108,18 @@ class Line:
             message = self._heard.get()
             if isinstance(message, Ended):
                 self._ended = replace(self._ended, killed=False)  # at its limit, or interrupted, it has ended by itself
-            elif isinstance(message, Message):
+            elif message is not None:
                 return message
         return replace(self._ended, stderr=self.process.stderr)
 
     def _listen(self) -> None:
-        message: Any = ()
+        """None for what is no message: its end, half a message, or one that cannot be read here."""
+        message: Message = ()
         while message is not None:
             try:
-                message = self.connection.recv()
-            except Exception:  # its end, half a message, or one that cannot be read here
+                said, message = self.connection.recv()
+                assert said == SAID
+            except Exception:
                 message = None
             self._heard.put(message)
 

@@ -1,4 +1,4 @@
-"""What a job says while it runs, and what it is told."""
+"""What jobs say while they run, and what they are told."""
 
 from __future__ import annotations
 
@@ -8,25 +8,10 @@ from typing import TYPE_CHECKING, Any
 from gradient_routes.bench.cases.status import Status
 
 if TYPE_CHECKING:
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.environment import Environment
     from gradient_routes.bench.cases.outcome import Outcome
-    from gradient_routes.bench.cases.row import Row
     from gradient_routes.bench.execution.references import Found
-
-
-@dataclass(frozen=True)
-class Kept:
-    """A row of a study's table, complete."""
-
-    table: str
-    row: Row
-
-
-@dataclass(frozen=True)
-class Note:
-    """A line for the user: a remark, or progress."""
-
-    text: str
 
 
 @dataclass(frozen=True)
@@ -98,7 +83,7 @@ class Ended:
         return f"{who}: {self.status}: {self.reason} - {self.status.todo}" if self.status.todo else self.reason
 
 
-Message = Kept | Note | Returned | Begun | Known | Ready | Turned | Done | Ended
+Message = Any  # one of these, or of bench.cases.study, or whatever else a job and its listener agree on
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
-from gradient_routes.bench.execution.isolation.channel import Channel, ended
+from gradient_routes.bench.execution.isolation.channel import SAID, Channel, ended
 from gradient_routes.bench.execution.isolation.inside import submit_to
 from gradient_routes.bench.execution.isolation.signals import STOPS
 from gradient_routes.bench.execution.isolation.stack import told
@@ -34,7 +34,7 @@ class Stop:
     def send(self, message: Any) -> None:
         self._sending = True
         try:
-            self._connection.send(message)
+            self._connection.send((SAID, message))
         finally:
             self._sending = False
         if self._waiting:
@@ -44,7 +44,7 @@ class Stop:
     def send_last(self, message: Any) -> None:
         """Nothing interrupts any more."""
         self._told = True
-        self._connection.send(message)
+        self._connection.send((SAID, message))
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self._told:

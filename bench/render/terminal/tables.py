@@ -12,9 +12,10 @@ from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.options import options_of
 from gradient_routes.bench.cases.outcome import View
-from gradient_routes.bench.cases.row import ANSWERED, Row
+from gradient_routes.bench.cases.row import ANSWERED
 from gradient_routes.bench.cases.selector import written
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import LEGEND, summary
@@ -45,9 +46,10 @@ def show(out: Console, table: Table) -> None:
     if Measurement.get(out, unlimited, table).maximum > out.width:
         for column in table.columns:
             column.width = column.min_width  # where there is none, the column stays as wide as its cells
-    wide = console()
-    wide.width = max(out.width, Measurement.get(out, unlimited, table).maximum)
-    wide.print(table)
+    width = out.width
+    out.width = max(width, Measurement.get(out, unlimited, table).maximum)
+    out.print(table)
+    out.width = width
 
 
 def results(rows: Sequence[Row]) -> Table:

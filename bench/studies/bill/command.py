@@ -27,9 +27,9 @@ from gradient_routes.bench.execution.options import executor_options, limit_opti
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.expected import Expectation
     from gradient_routes.bench.cases.outcome import Outcome, View
-    from gradient_routes.bench.cases.row import Row
     from gradient_routes.bench.execution.isolation.limits import Limits
     from gradient_routes.bench.execution.options import Executing
     from gradient_routes.bench.store.store import Store

@@ -6,19 +6,19 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import psutil
 import pytest
-from commands import FAULTY, Shell, ended, faulty
+from commands import Shell, ended, faulty, sigint_ignored
 
 from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.cases.study import Kept, Note
 from gradient_routes.bench.execution.isolation import run
 from gradient_routes.bench.execution.isolation.channel import Call, Channel
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.messages import Ended, Kept, Message, Note, Returned
+from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
 from gradient_routes.bench.execution.isolation.run import here, stream
 from gradient_routes.bench.execution.isolation.signals import interruptible
 from gradient_routes.problems.errors import DomainError, InputError, NotConverged, SingularMatrix
@@ -233,31 +233,21 @@ def test_stdout_is_for_who_takes_the_messages(capfd: pytest.CaptureFixture[str])
     assert (captured.out, captured.err) == ("result\n" * 3, "garbage\n")
 
 
-def sigint_ignored(start: Callable[[], object]) -> None:
-    """Run `start` while this process ignores SIGINT, which what it starts inherits."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        start()
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.parametrize(
     "given",
     [
-        ("check", f"{FAULTY}:Sleeping"),
         ("run", "--no-timing", "--problem", faulty(does="sleep"), "--route", "fd-central"),
         ("run", "--no-timing", "--jobs", "2", "--problem", faulty(does="sleep"), "--route", "fd-central"),
     ],
 )
 def test_a_command_started_with_sigint_ignored_is_interrupted_all_the_same(
-    started: Shell, given: tuple[str, ...], tmp_path: Path
+    started: Shell, given: tuple[str, ...]
 ) -> None:
-    process = []
-    sigint_ignored(lambda: process.append(started.start(*given)))
+    with sigint_ignored():
+        process = started.start(*given)
     started.asleep()
-    process[0].send_signal(signal.SIGINT)
-    ran = ended(process[0])
+    process.send_signal(signal.SIGINT)
+    ran = ended(process)
     assert (ran.code, "routes: interrupted" in ran.err) == (130, True), ran.err
     started.nothing_is_left()
 
