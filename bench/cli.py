@@ -16,7 +16,6 @@ from gradient_routes.bench.command_options import complain, debug_option, debugg
 from gradient_routes.bench.commands.compare import baseline, compare
 from gradient_routes.bench.commands.report import report
 from gradient_routes.bench.commands.status import status
-from gradient_routes.bench.execution.limited import FINISHED, Inside
 from gradient_routes.bench.studies.command import command_of
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gradient_routes.routes.solvers.factorization import LinearSolver
 
 STORE = Path("results") / "routes.sqlite"
+FINISHED = "what is finished is printed, and kept unless --no-store"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
 LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
