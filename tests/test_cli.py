@@ -67,7 +67,7 @@ def test_the_table_tells_the_bill(cli) -> None:
         "n_u",
         "n_p",
         "error",
-        "x fwd",
+        "cost / forward solve",
         "1 fwd + 8 lin",
         "1 fwd + 1 adj",
         "16 fwd",
@@ -77,6 +77,20 @@ def test_the_table_tells_the_bill(cli) -> None:
     ):
         assert words in out
     assert "3 of 8 elements lie behind the last sensor: blind" in out
+
+
+@pytest.mark.parametrize("verb", ["report", "status", "compare"])
+def test_tables_fit_80_columns(cli, monkeypatch: pytest.MonkeyPatch, verb: str) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    long = ("--route", "unrolled-ad[inner=jacobi,iterations=100]", "--route", "fd-central[start=chord]")
+    out = [run(cli, *long, problem="bar[n=8,sensors=1,3,5,7]", route="all").out]
+    store = "results/routes.sqlite"
+    out += [cli(verb, *([store, store] if verb == "compare" else [])).out]
+    for table in out:
+        rows = [line for line in table.splitlines() if ":" not in line and "; " not in line]
+        assert len(rows) > 3
+        assert max(map(len, rows)) <= 80
+    assert "1 fwd" in out[0]
 
 
 def test_gradient_view_shows_strains_and_the_blind(cli) -> None:

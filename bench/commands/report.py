@@ -49,7 +49,7 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
 
 def _print(store: Store) -> None:
     from gradient_routes.bench.render.terminal.tables import console
-    from gradient_routes.bench.studies.bill.command import show
+    from gradient_routes.bench.studies.bill.view import show
 
     show(store.rows())
     console().print(MORE, style="dim", soft_wrap=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.expected import Expectation
-    from gradient_routes.bench.cases.outcome import Outcome, View
+    from gradient_routes.bench.cases.outcome import Outcome
     from gradient_routes.bench.cases.row import Row
     from gradient_routes.bench.execution.isolation.limits import Limits
     from gradient_routes.bench.execution.options import Executing
@@ -176,6 +176,8 @@ class Done:
 
     def show(self, gradients: bool) -> None:
         """The table, in the order asked for, and gradients where those were asked for."""
+        from gradient_routes.bench.studies.bill.view import show
+
         if self.as_json:
             return
         ordered = sorted(self.outcomes, key=lambda outcome: outcome.place)
@@ -219,33 +221,6 @@ def _resumed() -> str:
     """This command again, for what is left."""
     given = [word for word in sys.argv[1:] if word != "--resume"]
     return shlex.join(["routes", *given, "--resume"])
-
-
-def show(
-    rows: list[Row],
-    views: Iterable[tuple[Row, View]] = (),
-    kept: Path | None = None,
-    known: Sequence[Expectation] = (),
-) -> None:
-    """The table, the reasons and notes below it, what was expected, the gradients where they were asked for."""
-    from gradient_routes.bench.cases.expected import judged
-    from gradient_routes.bench.render.terminal import tables
-
-    if not rows:
-        return
-    out = tables.console()
-    tables.show(out, tables.results(rows))
-    for line in tables.remarks(rows):
-        out.print(line, soft_wrap=not out.is_terminal)
-    for row in rows:
-        verdict = judged(row, known)
-        if verdict is not None:
-            out.print(f"{tables.titled(row)}: {row['route']}: {verdict.says}", style="yellow", soft_wrap=True)
-    if kept is not None:
-        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
-    for row, view in views:
-        out.print()
-        tables.show(out, tables.gradient(row, view))
 
 
 def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
