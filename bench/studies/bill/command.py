@@ -138,7 +138,7 @@ def run(
         raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
     finally:  # an interrupt leaves what was measured on the screen, too
         done.show(gradients=gradient == SHOWN)
-        said, failed = files.write(done.outcomes)
+        said, failed = files.write(done.ordered)
         for line in said:
             click.echo(line, err=as_json)
     if resume or only:
@@ -160,30 +160,46 @@ class Done:
         self.store, self.as_json, self.known, self._views = store, as_json, known, views
         self.outcomes: list[Outcome] = []
         self.lost: list[str] = []
+        self._waiting: dict[int, Row] = {}  # by their place: rows that come before the next to print
+        self._next = 0
 
     def take(self, outcome: Outcome) -> None:
-        from gradient_routes.bench.cases.row import as_json
-
+        """Keep a row at once; print it, as JSON, once all rows before it are printed."""
         try:
             if self.store is not None:
                 self.store.append(outcome.row, outcome.samples, outcome.environment)
         except InputError as error:  # a full disk, a lock: the row is printed all the same
             self.lost.append(str(error))
-        if self.as_json:
-            click.echo(as_json(outcome.row))
+        self._waiting[outcome.place] = outcome.row
+        while self._next in self._waiting:
+            self._print(self._next)
+            self._next += 1
         slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
         self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
 
+    def _print(self, place: int) -> None:
+        from gradient_routes.bench.cases.row import as_json
+
+        row = self._waiting.pop(place)
+        if self.as_json:
+            click.echo(as_json(row))
+
     def show(self, gradients: bool) -> None:
-        """The table, in the order asked for, and gradients where those were asked for."""
+        """The table in the order asked for, and gradients where those were asked for; rows of JSON that still wait."""
         from gradient_routes.bench.studies.bill.view import show
 
+        for place in sorted(self._waiting):
+            self._print(place)
         if self.as_json:
             return
-        ordered = sorted(self.outcomes, key=lambda outcome: outcome.place)
-        views = [(o.row, o.view) for o in ordered if o.view is not None and gradients]
+        views = [(o.row, o.view) for o in self.ordered if o.view is not None and gradients]
         kept = None if self.store is None or self.lost else self.store.path
-        show([o.row for o in ordered], views, kept, self.known)
+        show([o.row for o in self.ordered], views, kept, self.known)
+
+    @property
+    def ordered(self) -> list[Outcome]:
+        """The outcomes in the order asked for."""
+        return sorted(self.outcomes, key=lambda outcome: outcome.place)
 
     @property
     def failures(self) -> list[Row]:
