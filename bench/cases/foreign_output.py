@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -25,6 +24,8 @@ def stdout_to_stderr() -> Iterator[None]:
             yield
     finally:
         if os.name == "posix":
+            import ctypes
+
             ctypes.CDLL(None).fflush(None)  # what C holds back would be written later
         os.dup2(kept, 1)
         os.close(kept)

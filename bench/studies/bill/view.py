@@ -30,7 +30,7 @@ n_u unknowns, n_p parameters; error: |g - g_ref| / |g_ref|
 time: one gradient{{}}; cost / forward solve: that time over a forward solve's
 work: {WORK}
 memory: peak of one call; tape: stored by AD for its backward sweep"""
-UNSTABLE = ", ~ where samples vary by more than 10 %"
+UNSTABLE = ", ~: unstable"
 OUTPUT_TELLS = ("crashed", "timeout", "out-of-memory")  # statuses of no exception: the end of stderr may say why
 
 

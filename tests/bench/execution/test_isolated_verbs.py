@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from commands import FAULTY, Shell, ended, eventually, faulty
 
-from gradient_routes.bench.cli import KEEPING
+from gradient_routes.bench.commands.group import KEEPING
 from gradient_routes.bench.execution import limited
 from gradient_routes.bench.execution.isolation import process as watching
 from gradient_routes.bench.execution.limited import FINISHED
