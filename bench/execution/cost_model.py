@@ -73,7 +73,7 @@ def unaffordable(seconds: float, tape: float | None, work: Work, budget: float) 
     return None
 
 
-LEGEND = "fwd forward solves, lin linearized solves, adj adjoint solves, mv products with R_u"
+LEGEND = "fwd forward solves, lin linearized solves, adj transposed solves, mv products with R_u"
 
 
 def summary(work: Work) -> str:

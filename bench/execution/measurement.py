@@ -142,7 +142,8 @@ class Measurement:
             }
         with undisturbed():
             view, fields = self.bench.view(self.route, self.result), self.bench.fields(self.result)
-        return Outcome(self.row | {"status": "ok"}, samples, view, fields, environment())
+            columns = self.bench.sensitivities()
+        return Outcome(self.row | {"status": "ok"}, samples, view, fields, columns, environment())
 
 
 @contextmanager

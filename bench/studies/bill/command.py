@@ -43,6 +43,9 @@ GRADIENT = "Show the gradient parameter by parameter beside its reference; with 
 COMPONENTS = "Only so many components of dJ/dp, drawn at random: the bill of each, and its error."
 DIRECTIONS = "Only the slopes of J along so many random directions."
 VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView; for one problem and one route."
+SENSITIVITIES = "Write du/dp as FILE.csv, FILE.npz or FILE.vtu; for one problem and --route tangent."
+OF = "Of the state, du/dp, or of the data, d(S u)/dp."
+COLUMNS = "Parameters whose columns of du/dp are written, also to --vtu: 1,5-8. [all; none to --vtu]"
 BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 TIMING = "Without, gradients are computed and judged, their work counted and memory read, but not timed."
 RESUME = "Only cases that the store lacks, that failed, or whose code, data or libraries have changed."
@@ -63,6 +66,9 @@ ONLY = "The same for cases of one kind; all: each again."
 @click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
 @click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
+@click.option("--sensitivities", type=click.Path(path_type=Path), metavar="FILE", help=SENSITIVITIES)
+@click.option("--sensitivities-of", type=click.Choice(["state", "data"]), default="state", show_default=True, help=OF)
+@click.option("--columns", metavar="LIST", help=COLUMNS)
 @click.option("--resume", is_flag=True, help=RESUME)
 @click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
 @click.option("--expected", type=click.Path(path_type=Path), metavar="FILE.toml", help=EXPECTED)
@@ -84,6 +90,9 @@ def run(
     seed: int,
     gradient: str | None,
     vtu: Path | None,
+    sensitivities: Path | None,
+    sensitivities_of: str,
+    columns: str | None,
     resume: bool,
     only: Only | None,
     expected: Path | None,
@@ -107,26 +116,33 @@ def run(
     from gradient_routes.bench.execution.executors.interrupt import Interrupt
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.store import Store
-    from gradient_routes.bench.studies.bill.files import Files
+    from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
+    from gradient_routes.bench.studies.bill.sensitivity_files import wanted as columns_wanted
 
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     partial = chosen(components, directions, seed)
     how = executing(isolate, limits, timed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
-    files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
+    files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu, sensitivities)
     count = len(problem_specs) * len(route_specs)
-    files.check(count, partial, [*([kept] if kept else []), *case.files(problem_specs, at)])
+    files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *case.files(problem_specs, at)])
+    if sensitivities is None:
+        refuse_given(("sensitivities_of",), "is of --sensitivities")
+        if vtu is None or route_specs[0].name != COLUMNS_OF:
+            refuse_given(("columns",), f"is of --sensitivities, and of --vtu with --route {COLUMNS_OF}")
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
-    settings = Settings(at, checked(budget), min_time, timed, gradient is not None, solver, partial, vtu is not None)
+    du_dp = columns_wanted(sensitivities, sensitivities_of, columns, files.fields)
+    budget = checked(budget)
+    settings = Settings(at, budget, min_time, timed, gradient is not None, solver, partial, files.fields, du_dp)
     store = None if kept is None else Store(kept)
     known = _expectations(expected, kept)
     wanted = _wanted(store, resume, only, known)
     if store is not None:
         store.check_writable()
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
-    done = Done(store, as_json, known, views=gradient is not None or vtu is not None)
+    done = Done(store, as_json, known, views=gradient is not None or files.fields)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
     try:
         with closing(outcomes):  # whatever interrupts, cases under way are ended first
