@@ -44,7 +44,15 @@ def command_of(study: Study) -> click.Command:
 
 
 def _call(
-    study: Study, /, *, as_json: bool, kept: Path | None, no_plot: bool = False, isolate: bool, limits: Limits, **given: Any
+    study: Study,
+    /,
+    *,
+    as_json: bool,
+    kept: Path | None,
+    no_plot: bool = False,
+    isolate: bool,
+    limits: Limits,
+    **given: Any,
 ) -> None:
     from gradient_routes.bench.execution.isolation.run import here, stream
     from gradient_routes.bench.studies.job import RunStudy, Screen

@@ -29,8 +29,6 @@ class ExitCode:
     code: int
 
 
-
-
 @dataclass(frozen=True)
 class Screen:
     """What is known of stdout where the command runs, so that a view elsewhere prints for it."""
