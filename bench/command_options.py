@@ -13,15 +13,15 @@ from click.core import ParameterSource
 
 from gradient_routes.bench.sanitize import plain
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.solvers.registry import DEFAULT, points
 
 if TYPE_CHECKING:
     from gradient_routes.routes.newton import Newton
-    from gradient_routes.routes.solvers.factorization import LinearSolver
 
 STORE = Path("results") / "routes.sqlite"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
-LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
+LINEAR_SOLVERS = [*points()]
 ITERATIVE = "krylov and descent iterate, on systems of any kind, until --rtol is met."
 NEWTON = "Factors at every Newton step, or kept and iterated with."
 
@@ -38,7 +38,7 @@ max_steps_option = click.option(
     "--max-steps", type=int, default=50, show_default=True, help="Forward solve: Newton steps at most."
 )
 linear_solver_option = click.option(
-    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True, help=ITERATIVE
+    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default=DEFAULT, show_default=True, help=ITERATIVE
 )
 newton_option = click.option(
     "--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON
@@ -52,7 +52,7 @@ def solver_options(command: Command) -> Command:
     """Options of the forward solve; the command gets them as one `solver`. Raises InputError."""
 
     @wraps(command)
-    def with_solver(*, rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton, **others: Any) -> Any:
+    def with_solver(*, rtol: float, max_steps: int, linear_solver: str, newton: Newton, **others: Any) -> Any:
         from gradient_routes.routes.newton import Solver
 
         if not 0 < rtol < 1 or max_steps < 1:

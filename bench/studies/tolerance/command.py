@@ -32,7 +32,6 @@ from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.studies.tolerance.measure import Sweep
-    from gradient_routes.routes.solvers.factorization import LinearSolver
 
 Swept = Literal["forward", "adjoint", "both"]
 SWEEP = "Which tolerance varies. [both; forward where --adjoint-rtol is given]"
@@ -69,7 +68,7 @@ def tolerance(
     sweep: Swept | None,
     rtol: float | None,
     adjoint_rtol: float | None,
-    linear_solver: LinearSolver | None,
+    linear_solver: str | None,
     budget: float,
     no_plot: bool,
     as_json: bool,
@@ -98,7 +97,7 @@ def tolerance(
     if as_json:
         echo_json(tables)
     else:
-        view.show(done.rows, plotted=not no_plot, definite=done.definite)
+        view.show(done.rows, plotted=not no_plot, jumps=done.jumps)
     keep(kept, tables, started, quiet=as_json)
     if done.interrupted:
         raise KeyboardInterrupt

@@ -28,8 +28,8 @@ LEGEND = (
 )
 
 
-def show(rows: Sequence[Row], plotted: bool = True, definite: bool = False) -> None:
-    """`definite` is R_u of the problem: what descent is for."""
+def show(rows: Sequence[Row], plotted: bool = True, jumps: bool = False) -> None:
+    """`jumps`: the solver's error falls in jumps where that of steepest descent would fall evenly."""
     out = tables.console()
     measured = [row for row in rows if row["rtol"] is not None]
     if plotted and measured:
@@ -40,7 +40,7 @@ def show(rows: Sequence[Row], plotted: bool = True, definite: bool = False) -> N
         out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)
-    for line in remarks(rows, definite):
+    for line in remarks(rows, jumps):
         out.print(line, soft_wrap=not out.is_terminal)
 
 
@@ -112,7 +112,7 @@ def _cell(row: Row) -> str:
     return (number(row["gradient_error"], 2) or "unknown") if row["status"] == "ok" else row["status"]
 
 
-def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
+def remarks(rows: Sequence[Row], jumps: bool = False) -> list[Text]:
     """Reasons of what was skipped, and of what failed at which tolerances."""
     at: dict[tuple[str, str, str], list[float]] = {}
     for row in rows:
@@ -127,7 +127,7 @@ def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
         )
         for (status, reason, _), where in at.items()
     ]
-    slowly = SLOWLY if definite and rows[0]["linear_solver"] != "descent" else ""
+    slowly = SLOWLY if jumps else ""
     return lines + ([Text(f"note: {JUMPED}{slowly}", style="italic")] if _jumped(rows) else [])
 
 
