@@ -13,16 +13,16 @@ from click.core import ParameterSource
 
 from gradient_routes.bench.sanitize import plain
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.solvers.registry import DEFAULT, points
 
 if TYPE_CHECKING:
     from gradient_routes.routes.newton import Newton
-    from gradient_routes.routes.solvers.factorization import LinearSolver
 
 STORE = Path("results") / "routes.sqlite"
 FINISHED = "what is finished is printed, and kept unless --no-store"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (in quotes: [ and | are special to shells) or all. May be repeated."
 AT = "Point p of the gradient; a file has a header line and n_p values in one column."
-LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
+LINEAR_SOLVERS = [*points()]
 ITERATIVE = "Linear solver; krylov and descent are iterative, for any matrix, and stop at --rtol."
 NEWTON = "Factorize at every Newton step, or keep the factors and iterate with them."
 
@@ -43,7 +43,7 @@ max_steps_option = click.option(
     "--max-steps", type=int, default=50, show_default=True, help="Forward solve: largest number of Newton steps."
 )
 linear_solver_option = click.option(
-    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True, help=ITERATIVE
+    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default=DEFAULT, show_default=True, help=ITERATIVE
 )
 newton_option = click.option(
     "--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON
@@ -64,7 +64,7 @@ def solver_options(command: Command) -> Command:
     """Options of the forward solve, passed to the command as one `solver`. Raises InputError."""
 
     @wraps(command)
-    def with_solver(*, rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton, **others: Any) -> Any:
+    def with_solver(*, rtol: float, max_steps: int, linear_solver: str, newton: Newton, **others: Any) -> Any:
         from gradient_routes.routes.newton import Solver
 
         if not 0 < rtol < 1 or max_steps < 1:
