@@ -15,13 +15,14 @@ from gradient_routes.bench.sanitize import plain
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
-    from gradient_routes.routes.newton import Newton
+    from gradient_routes.routes.newton import Newton, Solver
     from gradient_routes.routes.solvers.factorization import LinearSolver
 
 STORE = Path("results") / "routes.sqlite"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (quoted: the shell has its own use for [ and |) or all; repeatable."
 AT = "The p to differentiate at; a file has a header line and n_p values in one column."
 LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
+NEWTONS = ["full", "inexact"]
 ITERATIVE = "krylov and descent iterate, on systems of any kind, until --rtol is met."
 NEWTON = "Factors at every Newton step, or kept and iterated with."
 
@@ -40,9 +41,7 @@ max_steps_option = click.option(
 linear_solver_option = click.option(
     "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True, help=ITERATIVE
 )
-newton_option = click.option(
-    "--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON
-)
+newton_option = click.option("--newton", type=click.Choice(NEWTONS), default="full", show_default=True, help=NEWTON)
 
 
 Command = Callable[..., Any]
@@ -53,13 +52,23 @@ def solver_options(command: Command) -> Command:
 
     @wraps(command)
     def with_solver(*, rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton, **others: Any) -> Any:
-        from gradient_routes.routes.newton import Solver
-
-        if not 0 < rtol < 1 or max_steps < 1:
-            raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
-        return command(solver=Solver(rtol, max_steps, linear_solver, newton), **others)
+        return command(solver=solver_of(rtol, max_steps, linear_solver, newton), **others)
 
     return rtol_option(max_steps_option(linear_solver_option(newton_option(with_solver))))
+
+
+def solver_of(
+    rtol: float = 1e-12, max_steps: int = 50, linear_solver: LinearSolver = "auto", newton: Newton = "full"
+) -> Solver:
+    """The forward solve that these options ask for. Raises InputError."""
+    from gradient_routes.routes.newton import Solver
+
+    if not 0 < rtol < 1 or max_steps < 1:
+        raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
+    for what, given, known in (("linear-solver", linear_solver, LINEAR_SOLVERS), ("newton", newton, NEWTONS)):
+        if given not in known:
+            raise InputError(f"--{what} {given} - choose from {', '.join(known)}")
+    return Solver(rtol, max_steps, linear_solver, newton)
 
 
 def store_options(command: Command) -> Command:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gradient_routes.bench.cases.suggest import did_you_mean
+from gradient_routes.bench.store.frames import frame
 from gradient_routes.bench.store.store import TABLES, Store
 from gradient_routes.problems.errors import InputError
 
-DTYPES = {"INTEGER": "Int64", "REAL": "Float64", "TEXT": "string"}
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
@@ -30,11 +33,11 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         rows = [dict(zip(names, record, strict=True)) for record in records]
         content = (json.dumps(rows, allow_nan=False) + "\n").encode()
     elif format == "parquet":
-        buffer = io.BytesIO()
-        frame(table, names, records).to_parquet(buffer, index=False)
-        content = buffer.getvalue()
+        content = _parquet(frame(TABLES[table], names, records))
     else:
-        content = frame(table, names, records).to_csv(index=False).encode()
+        text = io.StringIO(newline="")
+        csv.writer(text, lineterminator="\n").writerows([names, *records])
+        content = text.getvalue().encode()
     try:
         with click.open_file(str(output or "-"), "wb") as file:
             file.write(content)
@@ -45,10 +48,10 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         raise InputError(f"export: {where}: {error.strerror} - name a file you may write with -o") from error
 
 
-def frame(table: str, names: list[str], records: list[tuple[Any, ...]]) -> Any:
-    """A pandas DataFrame whose types are the schema's, whatever the data."""
-    import pandas as pd  # half a second that only these formats pay
-
-    types = {column.name: column.type for column in TABLES[table]}
-    data = pd.DataFrame.from_records(records, columns=names)
-    return data.astype({name: DTYPES[types.get(name, "TEXT").removesuffix(" PRIMARY KEY")] for name in names})
+def _parquet(table: DataFrame) -> bytes:
+    try:
+        return bytes(table.to_parquet(index=False))
+    except ImportError as error:
+        raise InputError(
+            "export: Parquet needs pyarrow - pip install 'gradient-routes[parquet]', or export as csv or json"
+        ) from error
