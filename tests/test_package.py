@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import venv
 import zipfile
 from dataclasses import dataclass
@@ -136,3 +138,23 @@ def test_python_m_is_the_command(installed: Installed) -> None:
     assert done.stdout == installed.run("routes", "--help").stdout
     where = installed.run("python", "-c", "import gradient_routes; print(gradient_routes.__file__)").stdout
     assert where.startswith(str(installed.bin.parent)), "the wheel is not what was tested"
+
+
+def test_the_citation_has_what_its_format_asks_for_and_the_version_of_the_package() -> None:
+    """Citation File Format 1.2.0: cff-version, message, title and authors are required."""
+    text = (ROOT / "CITATION.cff").read_text()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    top = dict(re.findall(r"^([a-z-]+):[ ]*(.*)$", text, re.MULTILINE))
+    assert top.keys() >= {"cff-version", "message", "title", "authors"}
+    assert (top["cff-version"], top["version"], top["license"]) == ("1.2.0", project["version"], project["license"])
+    assert top["repository-code"] == project["urls"]["Repository"]
+    assert re.findall(r"^  - name: (.*)$", text, re.MULTILINE) == [author["name"] for author in project["authors"]]
+
+
+def test_the_classifiers_name_the_versions_that_are_tested() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    named = re.findall(r"Python :: (3\.\d+)", "\n".join(project["classifiers"]))
+    for file, before in ((".ci/pythons.py", "VERSIONS = "), (".github/workflows/ci.yml", "python: ")):
+        line = (ROOT / file).read_text().partition(before)[2].partition("\n")[0]
+        assert re.findall(r"3\.\d+", line) == named, file
+    assert project["requires-python"] == f">={named[0]}"
