@@ -7,7 +7,7 @@ import io
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -15,9 +15,6 @@ from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.bench.store.frames import frame
 from gradient_routes.bench.store.store import TABLES, Store
 from gradient_routes.problems.errors import InputError
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
@@ -33,7 +30,7 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         rows = [dict(zip(names, record, strict=True)) for record in records]
         content = (json.dumps(rows, allow_nan=False) + "\n").encode()
     elif format == "parquet":
-        content = _parquet(frame(TABLES[table], names, records))
+        content = _parquet(table, names, records)
     else:
         text = io.StringIO(newline="")
         csv.writer(text, lineterminator="\n").writerows([names, *records])
@@ -48,10 +45,13 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         raise InputError(f"export: {where}: {error.strerror} - name a file you may write with -o") from error
 
 
-def _parquet(table: DataFrame) -> bytes:
+def _parquet(table: str, names: list[str], records: list[tuple[Any, ...]]) -> bytes:
     try:
-        return bytes(table.to_parquet(index=False))
+        import pandas  # noqa: F401
+        import pyarrow  # noqa: F401
     except ImportError as error:
         raise InputError(
-            "export: Parquet needs pyarrow - pip install 'gradient-routes[parquet]', or export as csv or json"
+            f"export: Parquet needs {error.name}, which is not installed - pip install 'gradient-routes[parquet]', or"
+            " export as csv or json"
         ) from error
+    return bytes(frame(TABLES[table], names, records).to_parquet(index=False))
