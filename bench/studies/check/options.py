@@ -72,7 +72,7 @@ def conclude(
     The page first: a closed pipe loses no file.
     """
     from gradient_routes.bench.cases.row import clean
-    from gradient_routes.bench.verification.rows import rows
+    from gradient_routes.bench.verification.result import rows
 
     lost = html is not None and not _write_page(check, html)
     if as_json:
