@@ -1,0 +1,161 @@
+"""The reference pages, generated from the declarations that the program itself reads."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import get_args
+
+import click
+
+import gradient_routes
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.options import options_of
+from gradient_routes.bench.cli import main
+from gradient_routes.bench.store.store import TABLES
+from gradient_routes.bench.verification.result import EXIT, INCONCLUSIVE, MEANING, Verdict
+from gradient_routes.problems.problem import OFFERED_AS, offer_names
+from gradient_routes.routes.route import Route
+
+
+def pages() -> dict[str, str]:
+    """File name -> Markdown, of every reference page."""
+    return {
+        "commands.md": commands(),
+        "problems.md": registered("problem"),
+        "routes.md": registered("route"),
+        "verdicts.md": verdicts(),
+        "tables.md": tables(),
+        "python.md": python(),
+    }
+
+
+def write(folder: Path) -> None:
+    """Write the pages that have changed, so that only those are built again."""
+    folder.mkdir(exist_ok=True)
+    for name, text in pages().items():
+        path = folder / name
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)
+
+
+def commands() -> str:
+    """Every command with its help, its arguments and its options."""
+    head = "Every option of every command. `routes COMMAND --help` prints the same.\n"
+    body = [_command(name, command) for name, command in sorted(main.commands.items())]
+    return "\n".join(["# Commands\n", head, *body])
+
+
+def _command(name: str, command: click.Command) -> str:
+    context = click.Context(command, info_name=name, parent=click.Context(main, info_name="routes"))
+    usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
+    options = [p for p in command.params if isinstance(p, click.Option)]
+    rows = [(_flags(p, context), plain(p.help or ""), _default(p, context)) for p in options]
+    return "\n".join(
+        [
+            f"## `routes {name}`\n",
+            f"```text\n{usage}\n```\n",
+            paragraphs(command.help or ""),
+            table(("option", "meaning", "default"), rows),
+        ]
+    )
+
+
+def _flags(option: click.Option, context: click.Context) -> str:
+    record = option.get_help_record(context)
+    return code(record[0] if record else ", ".join(option.opts))
+
+
+def _default(option: click.Option, context: click.Context) -> str:
+    default = option.get_default(context) if option.show_default else None
+    if default is None or isinstance(default, bool):
+        return ""
+    return code(" ".join(map(str, default)) if isinstance(default, list | tuple) else str(default))
+
+
+def registered(kind: registry.Kind) -> str:
+    """Every built-in problem or route with its options, from the registry."""
+    entries = [e for e in registry.registered(kind) if e.origin == registry.BUILT_IN]
+    head = f"`routes list {kind}s` prints the same, with those of installed plug-ins. Options are written in brackets:"
+    example = {"problem": "`'bar[n=64,noise=0.01]'`", "route": "`'adjoint[factors=fresh]'`"}[kind]
+    offers = table(("name", "what it is"), [(code(offer_names(o)[0]), plain(text)) for o, text in OFFERED_AS.items()])
+    what = "What a problem offers and a route needs" if kind == "problem" else "What a route needs of a problem"
+    body = [_entry(kind, entry) for entry in entries]
+    return "\n".join([f"# {kind.capitalize()}s\n", f"{head} {example}.\n", f"{what}:\n", offers, *body])
+
+
+def _entry(kind: registry.Kind, entry: registry.Entry) -> str:
+    target = entry.load()
+    if isinstance(target, Route):
+        contract = f"Needs: {', '.join(offer_names(target.needs))}."
+    else:
+        contract = f"Offers: {', '.join(offer_names(target.offers))}."
+    function = registry.factory_of(target)
+    rows = [(code(o.text), plain(o.help)) for o in options_of(function).values()]
+    options = table(("option", "meaning"), rows) if rows else "No options.\n"
+    doc = inspect.getdoc(function) or ""
+    text = f"```text\n{doc}\n```\n" if isinstance(target, Route) else paragraphs(doc)  # a route's is its equation
+    return "\n".join([f"## {entry.name}\n", text, f"{contract}\n", options])
+
+
+def verdicts() -> str:
+    """Every verdict with its meaning and the exit code of `routes check` and `routes vcurve`."""
+    rows = [(code(v), plain(MEANING[v]), str(EXIT.get(v, INCONCLUSIVE))) for v in get_args(Verdict)]
+    head = "What `routes check` and `routes vcurve` conclude, and the exit code they end with.\n"
+    last = "Exit code 2 is wrong usage. [Read a verdict](../how-to/read-a-verdict.md) says what to do about each.\n"
+    return "\n".join(["# Verdicts\n", head, table(("verdict", "meaning", "exit code"), rows), last])
+
+
+def tables() -> str:
+    """Every table of the store with its columns."""
+    head = (
+        "A store is one SQLite file. `routes export --table TABLE` writes a table as CSV, Parquet or JSON. An absent"
+        " value is NULL, never NaN. Columns that hold objects (options, a gradient, versions) are JSON text.\n"
+    )
+    body = [
+        f"## {name}\n\n" + table(("column", "unit", "meaning"), [(code(c.name), c.unit, plain(c.meaning)) for c in cs])
+        for name, cs in TABLES.items()
+    ]
+    return "\n".join(["# Tables and columns\n", head, *body])
+
+
+def python() -> str:
+    """Every public name with its signature and its docstring."""
+    head = "`import gradient_routes` gives these names. They are the public interface; everything else may change.\n"
+    return "\n".join(["# Python\n", head, *(_public(name) for name in sorted(gradient_routes.__all__))])
+
+
+def _public(name: str) -> str:
+    target = getattr(gradient_routes, name)
+    signature = f"{name}{inspect.signature(target)}" if callable(target) else name
+    return f"## `{name}`\n\n```text\n{signature}\n\n{inspect.getdoc(target)}\n```\n"
+
+
+def paragraphs(text: str) -> str:
+    """A help text or docstring: what click or the author has laid out by hand stays as it is."""
+    done = []
+    for part in re.split(r"\n\s*\n", inspect.cleandoc(text)):
+        if part.startswith("\b\n"):
+            done.append(f"```text\n{part[2:]}\n```\n")
+        elif "\n  " in part or part.startswith("  "):
+            done.append(f"```text\n{inspect.cleandoc(part)}\n```\n")
+        else:
+            done.append(plain(part) + "\n")
+    return "\n".join(done)
+
+
+def plain(text: str) -> str:
+    """Words that Markdown must not read: only what stands between backticks is code."""
+    pieces = re.split(r"(`[^`]*`)", " ".join(text.split()))
+    return "".join(p if p.startswith("`") else re.sub(r"([\\*_\[\]<>~#])", r"\\\1", p) for p in pieces)
+
+
+def code(text: str) -> str:
+    return f"`{text}`"
+
+
+def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *(tuple(cell.replace("|", r"\|") for cell in row) for row in rows)]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
