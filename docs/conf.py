@@ -21,4 +21,4 @@ html_show_copyright = False
 smartquotes = False  # --option stays as it is
 suppress_warnings = ["misc.highlighting_failure"]  # console blocks hold printed output
 
-runpy.run_path(str(HERE / "generated.py"))["write"](HERE / "reference")
+runpy.run_path(str(HERE / "generated.py"))["write"]()

@@ -1,4 +1,7 @@
-"""The reference pages, generated from the declarations that the program itself reads."""
+"""The reference pages, generated from the declarations that the program itself reads.
+
+`python docs/generated.py` writes them and results/README.md, the columns of the store, which is committed.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,10 @@ from gradient_routes.bench.verification.result import EXIT, INCONCLUSIVE, MEANIN
 from gradient_routes.problems.problem import OFFERED_AS, offer_names
 from gradient_routes.routes.route import Route
 
+HERE = Path(__file__).parent
+REFERENCE = HERE / "reference"
+RESULTS = HERE.parent / "results" / "README.md"
+
 
 def pages() -> dict[str, str]:
     """File name -> Markdown, of every reference page."""
@@ -32,7 +39,7 @@ def pages() -> dict[str, str]:
     }
 
 
-def write(folder: Path) -> None:
+def write(folder: Path = REFERENCE) -> None:
     """Write the pages that have changed, so that only those are built again."""
     folder.mkdir(exist_ok=True)
     for name, text in pages().items():
@@ -108,17 +115,18 @@ def verdicts() -> str:
     return "\n".join(["# Verdicts\n", head, table(("verdict", "meaning", "exit code"), rows), last])
 
 
-def tables() -> str:
+def tables(title: str = "Tables and columns") -> str:
     """Every table of the store with its columns."""
     head = (
-        "A store is one SQLite file. `routes export --table TABLE` writes a table as CSV, Parquet or JSON. An absent"
-        " value is NULL, never NaN. Columns that hold objects (options, a gradient, versions) are JSON text.\n"
+        "`routes run` and the studies append their results to `results/routes.sqlite` below the current folder."
+        " `routes export --table TABLE` writes a table as CSV, Parquet or JSON. An absent value is NULL, never NaN."
+        " Columns that hold objects (options, a gradient, versions) are JSON text.\n"
     )
     body = [
         f"## {name}\n\n" + table(("column", "unit", "meaning"), [(code(c.name), c.unit, plain(c.meaning)) for c in cs])
         for name, cs in TABLES.items()
     ]
-    return "\n".join(["# Tables and columns\n", head, *body])
+    return "\n".join([f"# {title}\n", head, *body])
 
 
 def python() -> str:
@@ -146,10 +154,14 @@ def paragraphs(text: str) -> str:
     return "\n".join(done)
 
 
+# escapes, emphasis, HTML, links; lists, quotes and headings where a text begins
+SPECIAL = re.compile(r"[\\*<]|(?<!\w)_|_(?!\w)|\](?=\()|^[#>+-]")
+
+
 def plain(text: str) -> str:
     """Words that Markdown must not read: only what stands between backticks is code."""
     pieces = re.split(r"(`[^`]*`)", " ".join(text.split()))
-    return "".join(p if p.startswith("`") else re.sub(r"([\\*_\[\]<>~#])", r"\\\1", p) for p in pieces)
+    return "".join(p if p.startswith("`") else re.sub(SPECIAL, r"\\\g<0>", p) for p in pieces)
 
 
 def code(text: str) -> str:
@@ -159,3 +171,8 @@ def code(text: str) -> str:
 def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     lines = [head, ("---",) * len(head), *(tuple(cell.replace("|", r"\|") for cell in row) for row in rows)]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
+
+
+if __name__ == "__main__":
+    write()
+    RESULTS.write_text(tables("Results"))

@@ -67,6 +67,12 @@ def test_every_column_of_every_table(pages: dict[str, str]) -> None:
             assert f"| `{column.name}` | {column.unit} | {column.meaning} |" in part
 
 
+def test_the_committed_table_of_columns_is_up_to_date() -> None:
+    assert (ROOT / "results" / "README.md").read_text() == GENERATED["tables"]("Results"), (
+        "run python docs/generated.py"
+    )
+
+
 def test_every_verdict_status_and_public_name(pages: dict[str, str]) -> None:
     assert all(f"| `{verdict}` |" in pages["verdicts.md"] for verdict in get_args(Verdict))
     assert all(status in pages["tables.md"] for status in STATUSES)
