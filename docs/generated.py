@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import enum
 import inspect
 import re
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import click
 
@@ -137,8 +139,25 @@ def python() -> str:
 
 def _public(name: str) -> str:
     target = getattr(gradient_routes, name)
-    signature = f"{name}{inspect.signature(target)}" if callable(target) else name
-    return f"## `{name}`\n\n```text\n{signature}\n\n{inspect.getdoc(target)}\n```\n"
+    parts = [f"## `{name}`\n", paragraphs(inspect.getdoc(target) or "")]
+    if isinstance(target, enum.EnumMeta):
+        return "\n".join([*parts, table(("member",), [(code(member),) for member in target.__members__])])
+    methods = [
+        (code(_call(key, value)), plain((inspect.getdoc(value) or "").split("\n\n")[0]))
+        for key, value in vars(target).items()
+        if inspect.isclass(target) and inspect.isfunction(value) and value.__doc__ and not key.startswith("_")
+    ]
+    listed = [table(("method", "meaning"), methods)] if methods else []
+    return "\n".join([parts[0], f"```text\n{_call(name, target)}\n```\n", *parts[1:], *listed])
+
+
+def _call(name: str, target: Callable[..., Any]) -> str:
+    """`name(parameters)` with defaults and without annotations, which the text explains; lines of 80 columns."""
+    given = inspect.signature(target)
+    shown = [q.replace(annotation=q.empty) for q in given.parameters.values() if q.name != "self"]
+    signature = str(given.replace(parameters=shown, return_annotation=given.empty))
+    signature = re.sub(r"<function (\w+) at 0x\w+>", r"\1", signature)
+    return textwrap.fill(f"{name}{signature}", 80, subsequent_indent=" " * 4, break_long_words=False)
 
 
 def paragraphs(text: str) -> str:
@@ -147,8 +166,8 @@ def paragraphs(text: str) -> str:
     for part in re.split(r"\n\s*\n", inspect.cleandoc(text)):
         if part.startswith("\b\n"):
             done.append(f"```text\n{part[2:]}\n```\n")
-        elif "\n  " in part or part.startswith("  "):
-            done.append(f"```text\n{inspect.cleandoc(part)}\n```\n")
+        elif part.startswith(">>>") or re.search(r"^  |\S  +\S", part, re.MULTILINE):
+            done.append(f"```text\n{textwrap.dedent(part)}\n```\n")
         else:
             done.append(plain(part) + "\n")
     return "\n".join(done)
