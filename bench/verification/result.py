@@ -24,6 +24,17 @@ Verdict = Literal[
 ]
 EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1}
 INCONCLUSIVE = 3
+MEANING: dict[Verdict, str] = {
+    "agrees": "the gradient and the difference quotients differ by no more than the quotients are uncertain by",
+    "wrong-gradient": "a difference that no step removes and no tighter forward solve reduces; where the solve cannot"
+    " be tightened, a difference of 1 % or more",
+    "inconsistent-discretization": "a difference that shrinks like h^k with the mesh size: the adjoint equation was"
+    " discretized on its own",
+    "solver-limited": "a difference, or noise, that falls when the forward solve is tightened",
+    "non-smooth": "one-sided quotients converge to different numbers, or active sets change between the points",
+    "noise-limited": "the noise of J leaves no usable step",
+    "undetermined": "none of these could be established; the sentence says why",
+}
 
 
 @dataclass(frozen=True)
