@@ -13,7 +13,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import InputError, SingularMatrix
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, GeneralSparse, SymmetricSparse
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.iterative import IterativeFactorization, Kind
 from gradient_routes.routes.solvers.pardiso import (
@@ -74,9 +74,9 @@ class Factorizer:
             return BlockFactorization(A, lambda block: self(block, who))
         if self.iterative is not None:
             return IterativeFactorization(A, who, self.iterative, self.rtol)
-        if isinstance(A, Chain):
+        if isinstance(A, Tridiagonal):
             return ChainFactorization(A, who)
-        if isinstance(A, Bordered):
+        if isinstance(A, BorderedTridiagonal):
             return BorderedFactorization(A, who)
         if isinstance(A, np.ndarray):
             return DenseFactorization(A, who)

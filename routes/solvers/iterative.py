@@ -14,7 +14,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.matrices.sparse import GeneralSparse, SymmetricSparse
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
 
 Kind = Literal["krylov", "descent"]
@@ -48,7 +48,7 @@ class IterativeFactorization:
         self._who, self._kind, self.rtol = who, kind, rtol
         self._symmetric = A.T is A or (isinstance(A, np.ndarray) and bool((A == A.T).all()))
         self.name = NAMES[kind, self._symmetric]
-        known = isinstance(A, Chain | Bordered | SymmetricSparse | GeneralSparse)
+        known = isinstance(A, Tridiagonal | BorderedTridiagonal | SymmetricSparse | GeneralSparse)
         self.norm = float(A.norm if known else abs(A).sum(axis=1).max())
         self.nbytes = int((A if known else A.data).nbytes)
         self._A = A.full().tocsr() if isinstance(A, SymmetricSparse) else A

@@ -33,8 +33,8 @@ class MultigridFactorization:
             raise SingularMatrix(self._indefinite(f"its diagonal has {A.diagonal[bad[0]]:.3g}"))
         self._A = A.full().tocsr()
         levels = pyamg.smoothed_aggregation_solver(
-            _blocked(self._A, A.pattern.near_kernel),
-            B=A.pattern.near_kernel,
+            _blocked(self._A, A.pattern.near_nullspace),
+            B=A.pattern.near_nullspace,
             symmetry="symmetric",
             improve_candidates=None,  # sweeps that take longer than the solve and save it nothing
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gradient_routes.problems.errors import SingularMatrix
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain, cumulative_sum
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal, cumulative_sum
 from gradient_routes.problems.problem import Array
 
 
@@ -18,9 +18,9 @@ class ChainFactorization:
 
     name = "cumulative sums"
 
-    def __init__(self, K: Chain, who: str) -> None:
+    def __init__(self, K: Tridiagonal, who: str) -> None:
         check_positive(K.D, who)
-        self.D, self.tip = K.D, K.tip
+        self.D, self.tip = K.D, K.end_spring
         self.norm, self.nbytes = K.norm, K.nbytes
 
     def solve(self, b: Array) -> Array:
@@ -43,7 +43,7 @@ class BorderedFactorization:
 
     name = "cumulative sums, L D L^T"
 
-    def __init__(self, A: Bordered, who: str) -> None:
+    def __init__(self, A: BorderedTridiagonal, who: str) -> None:
         check_positive(A.D, who)
         self.D, self.c, self.active = A.D, A.c, A.active
         self.norm, self.nbytes = A.norm, A.nbytes

@@ -18,7 +18,7 @@ from gradient_routes.routes.route import Route
 
 def top(block: Block, u: np.ndarray) -> np.ndarray:
     """Displacements of the nodes on the top, (m, 3)."""
-    return block.mechanics.supports.displacements(u, 0.0, 0, block.mechanics.loaded.node_set, np)
+    return block.solid.bc.displacements(u, 0.0, 0, block.solid.loaded.node_set, np)
 
 
 DATA = ROOT / "tests" / "data"
