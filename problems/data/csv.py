@@ -42,7 +42,7 @@ def read_columns(path: str | Path, names: tuple[str, ...] | None, optional: tupl
     places = [(header.index(name), column, name) for name, column in columns.items()]
     for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(header):
-            raise InputError(f"{path}: line {line} has {len(row)} cells, the header {len(header)} - mend the line")
+            raise InputError(f"{path}: line {line} has {len(row)} cells, the header {len(header)} - correct the line")
         for place, column, name in places:
             empty = name in optional and not row[place].strip()
             column[k] = math.nan if empty else _number(row[place], f"{path}: line {line}, column {name}")

@@ -108,7 +108,9 @@ def read_sensors(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sen
         raise InputError(f"{path}: has a header and no rows - add one row a sensor")
     for line, value in enumerate(node, start=2):
         if value != int(value) or not 1 <= value <= n:
-            raise InputError(f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - mend the row")
+            raise InputError(
+                f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - correct the row"
+            )
     at = {int(value): k for k, value in enumerate(node)}
     if len(at) < len(node):
         twice = next(int(v) for k, v in enumerate(node) if at[int(v)] != k)

@@ -86,5 +86,5 @@ def check_clamp(mesh: Mesh, clamped: Array) -> None:
         if (spread > 1e-9 * mesh.diameter).sum() < 2:
             what = "the body" if parts.max() == 0 else f"part {part + 1} of {parts.max() + 1} that share no node"
             raise InputError(
-                f"{mesh.who}: {len(held)} clamped nodes leave {what} free to turn: R_u is singular - clamp a face of it"
+                f"{mesh.who}: {len(held)} clamped nodes leave {what} free to turn: R_u is singular - clamp a face"
             )

@@ -112,7 +112,7 @@ def read_mesh(who: str, path: str | Path) -> Mesh:
         raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(MESHIO_CELLS)}")
     cells = found.cells_dict[kinds[0]]
     if cells.min() < 0 or cells.max() >= len(found.points):
-        raise InputError(f"{who}: mesh={path} has cells of points beyond its {len(found.points)} - mend the file")
+        raise InputError(f"{who}: mesh={path} has cells of points beyond its {len(found.points)} - correct the file")
     if np.shape(found.points)[1:] != (3,):
         raise InputError(
             f"{who}: mesh={path} has points of {np.shape(found.points)[-1]} coordinates - it needs x, y, z"
@@ -133,7 +133,7 @@ def _check_cells(mesh: Mesh, path: str | Path) -> None:
     """Raises InputError for flat, inverted or overlapping cells; either orientation of the numbering is valid."""
     geometry, skfem_mesh = mesh.geometry, mesh.skfem_mesh
     if not np.isfinite(geometry.X).all():
-        raise InputError(f"{mesh.who}: mesh={path} has points that are not finite - mend the file")
+        raise InputError(f"{mesh.who}: mesh={path} has points that are not finite - correct the file")
     det = geometry.determinants()  # (n_e, n_a), at the nodes
     extent = np.ptp(geometry.X[geometry.nodes], axis=1).max(axis=1)[:, None]
     bad = (np.abs(det) <= 1e-12 * extent**3).any(axis=1) | (np.sign(det) != np.sign(det[:, :1])).any(axis=1)
@@ -146,7 +146,7 @@ def _check_cells(mesh: Mesh, path: str | Path) -> None:
     if bad.any():
         raise InputError(
             f"{mesh.who}: mesh={path}: {bad.sum()} of {len(bad)} cells are flat, inside out or folded over a neighbour,"
-            f" first cell {np.flatnonzero(bad)[0] + 1} - mend the mesh"
+            f" first cell {np.flatnonzero(bad)[0] + 1} - correct the mesh"
         )
 
 

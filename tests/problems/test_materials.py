@@ -1,4 +1,4 @@
-"""Stored energies and their derivatives: laws of every energy, hand against AD, powers of stretches, closed forms."""
+"""Stored energies and their derivatives: invariance, hand-derived against AD, sums of powers, closed forms."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_natural_state_is_free_of_energy_and_stress(law: MaterialLaw) -> Non
 
 
 @every_law
-def test_small_strains_know_young_and_poisson_only(law: MaterialLaw) -> None:
+def test_moduli_at_small_strains_are_those_of_linear_elasticity(law: MaterialLaw) -> None:
     mu, lam = lame(E, NU)
     one = IDENTITY
     A = lam * np.einsum("iJ,kL->iJkL", one, one)
@@ -83,7 +83,7 @@ def test_small_strains_know_young_and_poisson_only(law: MaterialLaw) -> None:
 
 
 @hyperelastic
-def test_an_energy_does_not_see_a_rotation_after_or_before(law: MaterialLaw) -> None:
+def test_energies_are_objective_and_isotropic(law: MaterialLaw) -> None:
     F, Q = random_F(50), rotation()
     W = at(law, "W", F)
     close(at(law, "W", Q @ F), W, 1e-13)
@@ -91,7 +91,7 @@ def test_an_energy_does_not_see_a_rotation_after_or_before(law: MaterialLaw) -> 
     assert W.min() > 0
 
 
-def test_the_linear_energy_does_not_see_infinitesimal_rotations_and_is_isotropic() -> None:
+def test_the_linear_energy_is_isotropic_and_invariant_to_small_rotations() -> None:
     law, F, Q = LAWS["linear"], random_F(50), rotation()
     close(at(law, "W", Q @ F @ Q.T), at(law, "W", F), 1e-13)
     close(at(law, "P", F + (Q - Q.T)), at(law, "P", F), 1e-13)

@@ -1,4 +1,4 @@
-"""K = B^T D B: the sums are accurate, the zeros exact, the factorization inverts."""
+"""Tridiagonal matrices K = B^T D B: accurate sums, exact zeros, factorizations."""
 
 from __future__ import annotations
 
