@@ -18,7 +18,7 @@ from gradient_routes.problems.block import Block
 from gradient_routes.problems.data.probes import read_probes
 from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.fem.assembly_jax import gradient
-from gradient_routes.problems.fem.elements import Geometry
+from gradient_routes.problems.fem.elements import Element, Geometry
 from gradient_routes.problems.fem.mesh import box_mesh, read_mesh
 from gradient_routes.problems.jax64 import jax
 from gradient_routes.problems.mechanics.materials import LAWS
@@ -361,6 +361,22 @@ def test_points_in_distorted_and_in_flat_cells_are_found() -> None:
         N, _ = geometry.element.shape_functions(xi.T)
         np.testing.assert_allclose(np.einsum("ma,mai->mi", N, geometry.X[geometry.nodes[cells]]), x, atol=1e-8)
         assert outside.max() < 1e-9
+
+
+def test_points_in_the_bulge_of_a_curved_side_are_found() -> None:
+    """An edge through y = 0, -0.2, -0.16 reaches -0.2133, outside the box of its nodes; another cell is nearer."""
+    element = Element("tet10")
+    curved = element.basis.doflocs.copy()
+    curved[np.flatnonzero((curved == [1.0, 0.0, 0.0]).all(axis=1)), 1] = -0.16
+    curved[np.flatnonzero((curved == [0.5, 0.0, 0.0]).all(axis=1)), 1] = -0.2
+    xi = np.array([2 / 3, 1e-3, 1e-3])
+    x = element.shape_functions(xi)[0] @ curved
+    assert x[1] < curved[:, 1].min() - 0.01
+    X = np.concatenate([curved, x - [0.0, 0.1, 0.0] + 0.02 * element.basis.doflocs])
+    cells, found, outside = Geometry(element, np.arange(20).reshape(2, 10), X).locate(x[None])
+    assert cells.tolist() == [0]
+    np.testing.assert_allclose(found, [xi], atol=1e-9)
+    assert outside[0] < 0.0
 
 
 def test_meshes_in_two_parts_and_of_two_kinds_are_refused(tmp_path: Path) -> None:
