@@ -73,9 +73,7 @@ def late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("verb", ENDLESS)
-def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
-    verb: str, late: None, cli, tmp_path: Path
-) -> None:
+def test_what_a_verb_has_at_its_limit_is_shown_and_kept(verb: str, late: None, cli, tmp_path: Path) -> None:
     (tmp_path / "counted.py").write_text(COUNTED)
     ran = cli(verb, "--problem", "counted.py:Counted", "--json", "--isolate", *ENDLESS[verb])
     told = f"{verb}: timeout: after 3600 s of --timeout - raise the limit, or ask for less; {FINISHED}"
