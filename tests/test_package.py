@@ -158,3 +158,11 @@ def test_the_classifiers_name_the_versions_that_are_tested() -> None:
         line = (ROOT / file).read_text().partition(before)[2].partition("\n")[0]
         assert re.findall(r"3\.\d+", line) == named, file
     assert project["requires-python"] == f">={named[0]}"
+
+
+def test_make_test_pythons_names_tests_that_there_are() -> None:
+    done = subprocess.run(["make", "--dry-run", "test-pythons"], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    _, script, *tests = done.stdout.split()
+    assert len(tests) > 2
+    assert all((ROOT / name).exists() for name in (script, *tests))
