@@ -11,7 +11,7 @@ CHECKED := adjoint faulty-adjoint
 TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference clean
+.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference docs clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -84,6 +84,9 @@ reports: $(READY) ## everything in results/ as one page, results/report.html; of
 reference: $(READY) ## the small reference run that is committed, and its report, anew
 	$(BIN)/python -m benchmarks.reference_run
 
+docs: $(READY) ## the documentation as a site, docs/_build/index.html
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build
+
 clean: ## remove what was installed, built and cached; keep results/
-	rm -rf .venv .venvs build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	rm -rf .venv .venvs build dist docs/_build docs/reference *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
 	find . -name __pycache__ -type d -exec rm -rf {} +

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from gradient_routes.bench.studies.identify.identifiability import Identified
     from gradient_routes.bench.verification.result import Check
     from gradient_routes.routes.newton import Newton
-    from gradient_routes.routes.solvers.factorization import LinearSolver
 
 OneProblem = str | Problem
 OneRoute = str | Route
@@ -52,7 +51,7 @@ class SolverOptions(TypedDict, total=False):
 
     rtol: float
     max_steps: int
-    linear_solver: LinearSolver
+    linear_solver: str
     newton: Newton
 
 

@@ -13,14 +13,15 @@ import click
 
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.bench.store.frames import frame
-from gradient_routes.bench.store.store import TABLES, Store
+from gradient_routes.bench.store.schema import tables
+from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
     """Write a table of the store as CSV, Parquet or a JSON array of row objects, to a file or to stdout."""
-    if table not in TABLES:
-        raise InputError(f"export: no table '{table}' - {did_you_mean(table, TABLES)}")
+    if table not in tables():
+        raise InputError(f"export: no table '{table}' - {did_you_mean(table, tables())}")
     names, records = store.table(table)
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
@@ -54,4 +55,4 @@ def _parquet(table: str, names: list[str], records: list[tuple[Any, ...]]) -> by
             f"export: Parquet needs {error.name}, which is not installed - pip install 'gradient-routes[parquet]', or"
             " export as csv or json"
         ) from error
-    return bytes(frame(TABLES[table], names, records).to_parquet(index=False))
+    return bytes(frame(tables()[table], names, records).to_parquet(index=False))

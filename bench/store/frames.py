@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from gradient_routes.bench.cases.row import Column
+from gradient_routes.bench.cases.column import Column
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
