@@ -132,6 +132,17 @@ def test_it_runs_beside_routes_and_files_with_the_names_of_its_floors(installed:
     assert done.stdout.count('"status": "ok"') == 7
 
 
+def test_every_module_of_the_wheel_finds_what_it_imports(installed: Installed) -> None:
+    """Nothing that is installed rests on what is not: tests, benchmarks, examples."""
+    code = (
+        "from importlib import import_module; from pkgutil import walk_packages; import gradient_routes as g\n"
+        "for module in walk_packages(g.__path__, 'gradient_routes.'):\n"
+        "    if not module.name.endswith('__main__'): import_module(module.name)"
+    )
+    done = installed.run("python", "-c", code)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_python_m_is_the_command(installed: Installed) -> None:
     done = installed.run("python", "-m", "gradient_routes", "--help")
     assert (done.returncode, done.stderr) == (0, "")
