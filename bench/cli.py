@@ -1,9 +1,10 @@
-"""The command line: one group and the table of its commands. Nothing heavy is imported before a command needs it."""
+"""The command line: a command for every registered study, and those about a store. It imports nothing heavy."""
 
 from __future__ import annotations
 
 import click
 
+from gradient_routes.bench.cases import registry
 from gradient_routes.bench.commands.compare import baseline, compare
 from gradient_routes.bench.commands.completion import with_completion
 from gradient_routes.bench.commands.export import export
@@ -12,17 +13,8 @@ from gradient_routes.bench.commands.list import list_
 from gradient_routes.bench.commands.report import report
 from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
-from gradient_routes.bench.studies.bill.command import run
-from gradient_routes.bench.studies.check.command import check
-from gradient_routes.bench.studies.identify.command import identify
-from gradient_routes.bench.studies.invert.command import invert
-from gradient_routes.bench.studies.kink.command import kink
-from gradient_routes.bench.studies.scaling.command import scaling
-from gradient_routes.bench.studies.tolerance.command import tolerance
-from gradient_routes.bench.studies.unrolling.command import unrolling
-from gradient_routes.bench.studies.vcurve.command import vcurve
+from gradient_routes.bench.studies.command import command_of
 
-STUDIES: list[click.Command] = [run, vcurve, check, kink, tolerance, unrolling, scaling, invert, identify]
 OTHERS: list[click.Command] = [list_, status, report, export, compare, baseline]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
@@ -44,5 +36,5 @@ def main() -> None:
     """
 
 
-for command in (*STUDIES, *OTHERS):
+for command in (*map(command_of, registry.studies().values()), *OTHERS):
     main.add_command(with_completion(command))

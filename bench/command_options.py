@@ -52,6 +52,13 @@ newton_option = click.option(
 Command = Callable[..., Any]
 
 
+def routes_option(default: str, given: tuple[str, ...] | None = None) -> Callable[[Command], Command]:
+    """--route, repeatable; `given` is its value where it is not on the command line."""
+    values = [default] if given is None else list(given)
+    text = f"{SELECTOR} [{default}]"
+    return click.option("--route", "routes", multiple=True, default=values, metavar="SELECTOR", help=text)
+
+
 def solver_options(command: Command) -> Command:
     """Options of the forward solve, passed to the command as one `solver`. Raises InputError."""
 

@@ -23,9 +23,7 @@ ORDER = (
 )
 UPWARD = {  # still to be turned
     ("execution", "cli"),
-    ("store", "studies"),
     ("render", "studies"),
-    ("inversion", "studies"),
 }
 # the only modules that import JAX when they are imported; nothing imports those before it needs them
 TRACED = {

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from gradient_routes.bench.cases import registry
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 
 Item = TypeVar("Item")
 

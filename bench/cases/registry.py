@@ -1,19 +1,21 @@
-"""What exists: problems and routes, built-in and from plug-ins, all by entry points, loaded when asked for."""
+"""What exists: problems, routes and studies, built-in and from plug-ins, all by entry points, loaded when asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, entry_points
 from typing import Any, Literal
 
+from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.imported import imported, is_reference
+from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.problems.errors import InputError
-from gradient_routes.routes.route import Route
 
-Kind = Literal["problem", "route"]
+Kind = Literal["problem", "route", "study"]
+GROUPS = {"problem": "gradient_routes.problems", "route": "gradient_routes.routes", "study": "gradient_routes.studies"}
 BUILT_IN = "gradient-routes"
 
 
@@ -42,10 +44,10 @@ class Entry:
     @property
     def origin(self) -> str:
         """The distribution that registered it."""
-        return self.point.dist.name if self.point.dist else self.point.name
+        return distribution_name(self.point.dist) if self.point.dist else self.point.name
 
     def load(self) -> Any:
-        """The factory of a problem, or the Route. Raises InputError with the reason if that fails."""
+        """The factory of a problem, the Route or the Study. Raises InputError with the reason if that fails."""
         try:
             target = self.point.load()
         except InputError:
@@ -56,12 +58,14 @@ class Entry:
                 f"{self.kind} '{self.name}' of {self.origin} cannot be imported: {type(error).__name__}: {said}"
                 f" - mend or uninstall {self.origin}"
             ) from error
-        if self.kind == "route" and not isinstance(target, Route):
+        if self.kind == "route" and not is_route(target):
             raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
         if self.kind == "route" and isinstance(self.point, EntryPoint) and target.name != self.name:
             raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
         if self.kind == "problem" and not callable(target):
             raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
+        if self.kind == "study" and not (isinstance(target, Study) and target.name == self.name):
+            raise InputError(f"study '{self.name}' of {self.origin} is no Study of that name - register one")
         return target
 
     @property
@@ -79,9 +83,15 @@ class Entry:
 
 
 @cache
+def distribution_name(distribution: Distribution) -> str:
+    """Its name, which Python parses all its metadata for."""
+    return distribution.name
+
+
+@cache
 def registered(kind: Kind) -> list[Entry]:
     """All entries of a kind, built-ins first."""
-    found = [Entry(kind, point) for point in entry_points(group=f"gradient_routes.{kind}s")]
+    found = [Entry(kind, point) for point in entry_points(group=GROUPS[kind])]
     return sorted(found, key=lambda e: (e.origin != BUILT_IN, *place(e.name)))
 
 
@@ -99,6 +109,17 @@ def entries(kind: Kind) -> dict[str, Entry]:
     return first
 
 
+@cache
+def studies() -> dict[str, Study]:
+    """All that can be imported, by name."""
+    return {name: entry.load() for name, entry in entries("study").items() if entry.failure is None}
+
+
+def study_tables() -> dict[str, Table]:
+    """The tables of all studies, by name."""
+    return {name: table for study in studies().values() for name, table in study.tables.items()}
+
+
 # the order of the story: from nothing but J to the whole structure
 ORDER = (
     "bar",
@@ -112,6 +133,15 @@ ORDER = (
     "unrolled-ad",
     "implicit-ad",
     "faulty-adjoint",
+    "run",
+    "scaling",
+    "vcurve",
+    "check",
+    "tolerance",
+    "unrolling",
+    "kink",
+    "invert",
+    "identify",
 )
 
 
@@ -127,5 +157,11 @@ def find(kind: Kind, name: str) -> Entry:
 
 def factory_of(target: Any) -> Callable[..., Any]:
     """What declares the options: a route's function, or the problem's factory itself."""
-    function: Callable[..., Any] = target.function if isinstance(target, Route) else target
+    function: Callable[..., Any] = target.function if is_route(target) else target
     return function
+
+
+def is_route(target: Any) -> bool:
+    from gradient_routes.routes.route import Route  # NumPy with it: `routes --help` starts without
+
+    return isinstance(target, Route)

@@ -53,14 +53,14 @@ class Routes(click.Group):
 
 def exhausted(failure: BaseException) -> bool:
     """Whether an error that is not ours says that memory was not enough."""
-    from gradient_routes.bench.cases.outcome import status_of
+    from gradient_routes.bench.cases.status import status_of
 
     return not isinstance(failure, RoutesError | OSError) and status_of(failure) == "out-of-memory"
 
 
 def said(failure: BaseException, command: str | None) -> str:
     """An error in one line."""
-    from gradient_routes.bench.cases.outcome import one_line
+    from gradient_routes.bench.cases.status import one_line
 
     if isinstance(failure, RoutesError):
         return str(failure)

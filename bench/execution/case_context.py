@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, point
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Sensitivities, View
 from gradient_routes.bench.cases.partial import Partial
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
 from gradient_routes.bench.execution.references import Found, Judge, Judges

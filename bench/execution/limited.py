@@ -1,4 +1,4 @@
-"""Limits on what a verb runs: options, and the verb in a process of its own."""
+"""A command in a process of its own."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gradient_routes.bench.command_options import Command, complain, refuse_given
+from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.command_options import Command, complain
+from gradient_routes.bench.execution.isolation.signals import interruptible
+from gradient_routes.bench.execution.options import limit_options
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,16 +27,7 @@ if TYPE_CHECKING:
 
 FAILED, INTERRUPTED = 1, 130
 FINISHED = "what is finished is printed, and kept unless --no-store"
-GRACE = 5.0  # [s] between an interrupt and the end of what does not react to it
 LAST = 10.0  # [s] to keep what there is when the time is over
-STOPS = (
-    f"Seconds of wall time, after which {{}} is stopped, and {LAST:g} s later killed with all it started; inf: none."
-)
-ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
-KILLS = "Seconds of wall time, after which {} is killed with all it started; inf: none."
-MEMORY = "Resident memory at which it is killed: 4GiB, 500MB. [what the machine has]"
-THREADS = "Threads of BLAS, PARDISO and XLA each."
-AFFINITY = "Processors to stay on: 0 or 0,2-3. [any]"
 
 
 @dataclass
@@ -42,43 +36,6 @@ class Inside:
 
     stopped: bool = False  # it has been told to end
     expired: bool = False  # its time is over, and it is being stopped: the process that watches it says so
-
-
-def limit_options(what: str, timeout: float, ends: str = KILLS) -> Callable[[Command], Command]:
-    """--isolate, --timeout, --memory, --threads, --affinity; the command gets `isolate` and `limits`."""
-
-    def decorate(command: Command) -> Command:
-        @wraps(command)
-        def with_limits(
-            *, isolate: bool, timeout: float, memory: str | None, threads: int, affinity: str | None, **others: Any
-        ) -> Any:
-            from gradient_routes.bench.execution.isolation import limits as given
-
-            if not isolate:
-                refuse_given(("timeout", "memory"), "holds for processes of their own, not with --no-isolate")
-            if isolate and os.name != "posix":
-                raise InputError("--isolate: needs pipes and process groups of POSIX - give --no-isolate here")
-            limits = given.Limits(
-                given.checked_timeout(timeout),
-                given.memory_of(memory),
-                given.checked_threads(threads),
-                given.affinity_of(affinity),
-            )
-            return command(isolate=isolate, limits=limits, **others)
-
-        options = (
-            click.option("--isolate/--no-isolate", default=True, show_default=True, help=ISOLATE),
-            click.option("--timeout", type=float, default=timeout, show_default=True, help=ends.format(what)),
-            click.option("--memory", metavar="SIZE", help=MEMORY),
-            click.option("--threads", type=int, default=1, show_default=True, help=THREADS),
-            click.option("--affinity", metavar="LIST", help=AFFINITY),
-        )
-        decorated: Command = with_limits
-        for option in reversed(options):
-            decorated = option(decorated)
-        return decorated
-
-    return decorate
 
 
 def confined(timeout: float = 3600.0, keeps: bool = False) -> Callable[[Command], Command]:
@@ -94,23 +51,12 @@ def confined(timeout: float = 3600.0, keeps: bool = False) -> Callable[[Command]
             if isolate and not isinstance(context.find_root().obj, Inside):
                 raise click.exceptions.Exit(_watched(context.info_name or "", limits, keeps, others.get("kept")))
             if not isolate:
-                pin(limits)
+                limits.pin()
             return command(**others)
 
-        return limit_options("it", timeout, STOPS if keeps else KILLS)(apart)
+        return limit_options("it", timeout, LAST if keeps else 0.0)(apart)
 
     return decorate
-
-
-def pin(limits: Limits) -> None:
-    """Threads and processors of this very process: by variables where libraries are yet to be loaded."""
-    os.environ.update(limits.environment)
-    if "numpy" in sys.modules:
-        from threadpoolctl import threadpool_limits
-
-        threadpool_limits(limits.threads)
-    if limits.affinity is not None:
-        os.sched_setaffinity(0, limits.affinity)
 
 
 def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
@@ -121,7 +67,7 @@ def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
     given = json.dumps(asdict(limits) | {"timeout": None})
     reader, writer = os.pipe()
     arguments = [given, str(os.getpid()), str(writer), *sys.argv[1:]]
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what was started ends, too
+    interruptible()  # what was started ends, too
     last = (EXPIRED, LAST) if keeps else None
     process = Confined(
         "gradient_routes.bench.execution.isolation.command",
@@ -145,7 +91,7 @@ def _watched(verb: str, limits: Limits, keeps: bool, kept: Any) -> int:
     if word == ENDED:
         return code
     if word:
-        return _ended(verb, "out-of-memory", word, "raise --memory, or ask for less", process, kept)
+        return _ended(verb, Status.OUT_OF_MEMORY, word, "raise --memory, or ask for less", process, kept)
     ending = process.ending()
     return _ended(verb, ending.status, ending.reason, "see what it says above", process, kept)
 
@@ -170,6 +116,8 @@ def _ended(verb: str, status: str, reason: str, todo: str, process: Confined, ke
 
 def _interrupted(process: Confined) -> int:
     """The verb may still print and keep what it has."""
+    from gradient_routes.bench.execution.isolation.run import GRACE
+
     process.process.send_signal(signal.SIGINT)
     with suppress(KeyboardInterrupt):  # the user's patience is over
         process.ended(GRACE)

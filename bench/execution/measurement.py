@@ -12,17 +12,20 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import environment
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
-from gradient_routes.bench.cases.outcome import FOREIGN, Failure, NonFinite, Outcome, failed, note
-from gradient_routes.bench.cases.row import Row, empty_row
+from gradient_routes.bench.cases.outcome import Outcome, failed, note
+from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite
 from gradient_routes.bench.execution.case_context import Workbench
 from gradient_routes.bench.execution.cost_model import summary
+from gradient_routes.bench.execution.isolation.channel import Channel
+from gradient_routes.bench.execution.isolation.messages import Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Judge, norm2
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
-from gradient_routes.bench.execution.worker import Channel
 from gradient_routes.bench.units import duration, now
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
@@ -115,12 +118,12 @@ class Measurement:
 
     def in_turns(self, channel: Channel) -> Outcome:
         """Timed when told to."""
-        channel.say("ready", (self.long, self.bench.judges.found))
-        kind, interleaved = channel.hear()
-        while kind == "turn":
-            channel.say("turned", self.turn())
-            kind, interleaved = channel.hear()
-        return self.outcome(interleaved)
+        channel.say(Ready(self.long, self.bench.judges.found))
+        order = channel.hear()
+        while isinstance(order, Turn):
+            channel.say(Turned(self.turn()))
+            order = channel.hear()
+        return self.outcome(order.interleaved)
 
     def outcome(self, interleaved: int) -> Outcome:
         """The row with its timings, taken beside those of so many cases."""

@@ -11,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.environment import Environment, fingerprint
 from gradient_routes.bench.cases.order import in_order
-from gradient_routes.bench.cases.row import COLUMNS, Column, Row, clean
+from gradient_routes.bench.cases.row import COLUMNS, clean
 from gradient_routes.bench.regression.measured import KEPT, Case, Measured, Verdict, of_store
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError

@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.regression.compare import Comparison
 from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding, Judgement

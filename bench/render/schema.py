@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gradient_routes.bench.cases.row import Column
-from gradient_routes.bench.store.store import TABLES
+from gradient_routes.bench.cases.column import Column
+from gradient_routes.bench.store.schema import tables
 
 HEAD = """# Results
 
@@ -17,7 +17,7 @@ Columns that hold objects (options, gradient, threads, versions) are JSON text.
 
 def markdown() -> str:
     """All tables and columns with their units and meanings."""
-    return HEAD + "".join(f"\n## {name}\n\n{_table(columns)}" for name, columns in TABLES.items())
+    return HEAD + "".join(f"\n## {name}\n\n{_table(columns)}" for name, columns in tables().items())
 
 
 def _table(columns: Iterable[Column]) -> str:

@@ -11,7 +11,8 @@ from typing import Any
 import click
 
 from gradient_routes.bench.cases.suggest import did_you_mean
-from gradient_routes.bench.store.store import TABLES, Store
+from gradient_routes.bench.store.schema import tables
+from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 
 DTYPES = {"INTEGER": "Int64", "REAL": "Float64", "TEXT": "string"}
@@ -19,8 +20,8 @@ DTYPES = {"INTEGER": "Int64", "REAL": "Float64", "TEXT": "string"}
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
     """Write a table of the store as CSV, Parquet or a JSON array of row objects, to a file or to stdout."""
-    if table not in TABLES:
-        raise InputError(f"export: no table '{table}' - {did_you_mean(table, TABLES)}")
+    if table not in tables():
+        raise InputError(f"export: no table '{table}' - {did_you_mean(table, tables())}")
     names, records = store.table(table)
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
@@ -49,6 +50,6 @@ def frame(table: str, names: list[str], records: list[tuple[Any, ...]]) -> Any:
     """A pandas DataFrame whose types are the schema's, whatever the data."""
     import pandas as pd  # half a second that only these formats pay
 
-    types = {column.name: column.type for column in TABLES[table]}
+    types = {column.name: column.type for column in tables()[table]}
     data = pd.DataFrame.from_records(records, columns=names)
     return data.astype({name: DTYPES[types.get(name, "TEXT").removesuffix(" PRIMARY KEY")] for name in names})

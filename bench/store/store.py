@@ -15,33 +15,17 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment, environment, fingerprint
-from gradient_routes.bench.cases.row import (
-    ENVIRONMENTS,
-    KEYS,
-    SAMPLES,
-    STORED,
-    Column,
-    Row,
-    as_record,
-    from_record,
-    stored,
-)
+from gradient_routes.bench.cases.row import ENVIRONMENTS, STORED, as_record, from_record, stored
 from gradient_routes.bench.cases.samples import Samples
-from gradient_routes.bench.studies.columns import KEY, STUDIES, STUDY
+from gradient_routes.bench.store.schema import KEY, tables
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
 SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: scaling, inversion, identifiability
 PATIENCE = 60.0  # [s] to wait for another writer
-TABLES: dict[str, tuple[Column, ...]] = {
-    "cases": (KEYS[0], KEYS[1], *STORED),
-    "samples": SAMPLES,
-    "environments": ENVIRONMENTS,
-    "studies": STUDY,
-    **{name: (KEY, *columns) for name, columns in STUDIES.items()},
-}
 
 
 class Store:
@@ -84,15 +68,15 @@ class Store:
                     timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
                     db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
 
-    def append_study(self, tables: Mapping[str, Sequence[Row]], started: str) -> int:
+    def append_study(self, found: Mapping[str, Sequence[Row]], started: str) -> int:
         """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""
         with self._transaction() as db:
-            values = (next(iter(tables)), self._environment_id(db), started, "ok")
+            values = (next(iter(found)), self._environment_id(db), started, "ok")
             names = "study, environment_id, started, status"
             cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?)", values)
             study_id = int(cursor.lastrowid or 0)
-            for name, rows in tables.items():
-                columns = STUDIES[name]
+            for name, rows in found.items():
+                columns = tables()[name][1:]
                 marks = ", ".join("?" * (1 + len(columns)))
                 names = ", ".join(c.name for c in (KEY, *columns))
                 records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in rows]
@@ -107,10 +91,10 @@ class Store:
             db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
 
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
+        """Column names and rows of a table, oldest first. Raises InputError where there is no store."""
         with self._reading() as db:
             if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
-                return [c.name for c in TABLES[name]], []  # a store of an older schema
+                return [c.name for c in tables()[name]], []  # a store of an older schema
             cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
             return [d[0] for d in cursor.description], cursor.fetchall()
 
@@ -122,8 +106,8 @@ class Store:
         return [self._parsed(name, dict(zip(names, record, strict=True))) for record in values]
 
     def _parsed(self, table: str, record: Row) -> Row:
-        row: Row = dict.fromkeys(column.name for column in TABLES[table]) | record
-        for column in TABLES[table]:
+        row: Row = dict.fromkeys(column.name for column in tables()[table]) | record
+        for column in tables()[table]:
             value = row[column.name]
             if column.json and value is not None:
                 try:
@@ -198,14 +182,14 @@ class Store:
     @staticmethod
     def _create_tables(db: sqlite3.Connection) -> None:
         """Those that are not there yet."""
-        for name, columns in TABLES.items():
+        for name, columns in tables().items():
             db.execute(f"CREATE TABLE IF NOT EXISTS {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
         db.execute("CREATE INDEX IF NOT EXISTS by_case ON cases (case_key)")
 
     def _migrate(self, db: sqlite3.Connection) -> None:
         """What an older schema lacks is added, absent in its rows."""
         if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
-            for name, columns in TABLES.items():
+            for name, columns in tables().items():
                 there = {column[1] for column in db.execute(f"PRAGMA table_info({name})")}
                 for column in columns:
                     if there and column.name not in there:

@@ -45,7 +45,7 @@ def main() -> None:
         os.write(int(line), ENDED.encode())
         raise
     except Exception as failure:
-        from gradient_routes.bench.cases.outcome import one_line, status_of
+        from gradient_routes.bench.cases.status import one_line, status_of
 
         if status_of(failure) != "out-of-memory":
             raise

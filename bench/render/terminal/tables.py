@@ -10,8 +10,8 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.options import options_of
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.selector import written
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.render.terminal.terminal import Terminal
@@ -40,9 +40,10 @@ def show(out: Console, table: Table | TextTable) -> None:
         return
     unlimited = out.options.update(width=10_000)
     _narrow(table, Measurement.get(out, unlimited, table).maximum - out.width, unlimited, out)
-    wide = console()
-    wide.width = max(out.width, Measurement.get(out, unlimited, table).maximum)
-    wide.print(table)
+    width = out.width
+    out.width = max(width, Measurement.get(out, unlimited, table).maximum)
+    out.print(table)
+    out.width = width
 
 
 def _narrow(table: Table, excess: int, unlimited: ConsoleOptions, out: Console) -> None:

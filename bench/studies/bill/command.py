@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
@@ -24,14 +23,13 @@ from gradient_routes.bench.command_options import (
     solver_options,
     store_options,
 )
-from gradient_routes.bench.execution.limited import limit_options
-from gradient_routes.bench.execution.options import executor_options
+from gradient_routes.bench.execution.options import executor_options, limit_options
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.expected import Expectation
     from gradient_routes.bench.cases.outcome import Outcome
-    from gradient_routes.bench.cases.row import Row
     from gradient_routes.bench.execution.isolation.limits import Limits
     from gradient_routes.bench.execution.options import Executing
     from gradient_routes.bench.store.store import Store
@@ -113,7 +111,7 @@ def run(
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.partial import chosen
     from gradient_routes.bench.cases.settings import Settings
-    from gradient_routes.bench.execution.executors.interrupt import Interrupt
+    from gradient_routes.bench.execution.isolation.signals import Interrupt, interruptible
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.store import Store
     from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
@@ -143,7 +141,7 @@ def run(
         store.check_writable()
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
     done = Done(store, as_json, known, views=gradient is not None or files.fields)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
+    interruptible()  # SIGTERM ends it like Ctrl-C: with a table
     try:
         with closing(outcomes):  # whatever interrupts, cases under way are ended first
             for outcome in with_progress(outcomes, count):

@@ -10,9 +10,10 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.expected import Expectation, judged
 from gradient_routes.bench.cases.outcome import View
-from gradient_routes.bench.cases.row import ANSWERED, Row
+from gradient_routes.bench.cases.row import ANSWERED
 from gradient_routes.bench.execution.cost_model import LEGEND as WORK
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.execution.isolation.stack import without

@@ -8,7 +8,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.execution.cost_model import LEGEND, summary
 from gradient_routes.bench.render.format import bytes_, ratio, seconds
 from gradient_routes.bench.render.terminal import tables
@@ -27,8 +27,7 @@ memory: peak of one call; tape: stored by AD for its backward sweep
 work: {LEGEND}"""
 
 
-def show(done: Scaling, plotted: bool = True) -> None:
-    out = tables.console()
+def show(out: Console, done: Scaling, plotted: bool = True) -> None:
     if plotted and any(series.rows for series in done.series):
         out.print(plots(done, out.width))
         out.print()

@@ -10,13 +10,18 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from benchmarks.judged import Bench, said
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.study import Found, Kept, Say
+from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
+from gradient_routes.bench.studies.judged import Bench, said
+from gradient_routes.bench.studies.options import one_problem, routes_of
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
@@ -24,6 +29,8 @@ from gradient_routes.routes.newton import Solver, norm
 from gradient_routes.routes.route import Options, Result, Route
 from gradient_routes.routes.solvers.factorization import LinearSolver
 
+Swept = Literal["forward", "adjoint", "both"]
+TIGHT = 1e-12  # tolerance of the solves that are not swept
 NOT_SHARED = ("definite", "interrupted", "points")  # by rows
 FEW = 32  # unknowns up to which conjugate gradients are exact before they are accurate
 
@@ -59,7 +66,7 @@ def decades(loosest: float, tightest: float, per_decade: int = 1) -> tuple[float
 
 @dataclass(frozen=True)
 class Point:
-    """A route at one pair of tolerances; skipped as a whole, it has none. Columns as in bench.studies.columns."""
+    """A route at one pair of tolerances; skipped as a whole, it has none. Fields are columns of its table."""
 
     route: str
     route_options: Options
@@ -99,6 +106,52 @@ class Tolerance:
         """Tidy: one a point, with the columns of the table `tolerance`."""
         shared = {name: value for name, value in vars(self).items() if name not in NOT_SHARED}
         return [shared | asdict(point) for point in self.points]
+
+
+def run(
+    say: Say,
+    *,
+    selector: str,
+    routes: Sequence[str],
+    at: str,
+    loosest: float,
+    tightest: float,
+    per_decade: int,
+    sweep: Swept | None,
+    rtol: float | None,
+    adjoint_rtol: float | None,
+    linear_solver: LinearSolver | None,
+    budget: float,
+    kept: Path | None = None,
+) -> None:
+    """Ctrl-C ends the study, not what it has measured."""
+    problem, specs = one_problem(selector), routes_of(routes, say)
+    tolerances = sweep_of(decades(loosest, tightest, per_decade), sweep, rtol, adjoint_rtol)
+    done = tolerance(problem, specs, tolerances, at, linear_solver, checked(budget))
+    say(Found(done))
+    for row in done.rows:
+        say(Kept("tolerance", row))
+    if done.interrupted:
+        raise KeyboardInterrupt
+
+
+def sweep_of(
+    tolerances: tuple[float, ...], sweep: Swept | None, rtol: float | None, adjoint_rtol: float | None
+) -> Sweep:
+    """Which tolerance varies and where the other stays. Raises InputError."""
+    for name, value in (("--rtol", rtol), ("--adjoint-rtol", adjoint_rtol)):
+        if value is not None and not 0.0 < value < 1.0:
+            raise InputError(f"{name} {value:g} - give a tolerance between 0 and 1")
+    sweep = sweep or ("both" if adjoint_rtol is None else "forward")
+    if rtol is not None and sweep != "adjoint":
+        raise InputError(f"--rtol {rtol:g} with the forward tolerance swept - add --sweep adjoint or drop it")
+    if adjoint_rtol is not None and sweep != "forward":
+        raise InputError(f"--adjoint-rtol {adjoint_rtol:g} with the adjoint's swept - take --sweep forward or drop it")
+    return Sweep(
+        tolerances,
+        forward=(rtol or TIGHT) if sweep == "adjoint" else None,
+        adjoint=(adjoint_rtol or TIGHT) if sweep == "forward" else None,
+    )
 
 
 def tolerance(

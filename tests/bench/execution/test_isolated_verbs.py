@@ -6,10 +6,11 @@ import json
 import signal
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from commands import FAULTY, Shell, ended, eventually, faulty
+from commands import FAULTY, Shell, ended, eventually, faulty, sigint_ignored
 
 from gradient_routes.bench.commands.group import KEEPING
 from gradient_routes.bench.execution import limited
@@ -116,10 +117,15 @@ def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
         assert ran.out == ""
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-@pytest.mark.parametrize("model", ["Sleeping", "Stubborn"])
-def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str) -> None:
-    process = started.start("check", f"{FAULTY}:{model}")
+@pytest.mark.parametrize(
+    ("model", "name", "ignored"),
+    [(model, name, False) for model in ("Sleeping", "Stubborn") for name in ("SIGINT", "SIGTERM")]
+    + [("Sleeping", "SIGINT", True)],
+)
+def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str, ignored: bool) -> None:
+    """Also where it was started with SIGINT ignored, as what shells start in the background is."""
+    with sigint_ignored() if ignored else nullcontext():
+        process = started.start("check", f"{FAULTY}:{model}")
     started.asleep()
     process.send_signal(signal.Signals[name])
     ran = ended(process)

@@ -10,7 +10,7 @@ import pytest
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import TOLERANCE
+from gradient_routes.bench.studies.tolerance.columns import TOLERANCE
 from gradient_routes.bench.studies.tolerance.measure import (
     Experiment,
     Sweep,
