@@ -20,7 +20,7 @@ from gradient_routes.bench.execution.isolation.stack import without
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
-from gradient_routes.bench.render.terminal.tables import MANY, RESOLUTION, named, titled
+from gradient_routes.bench.render.terminal.tables import MANY, RESOLUTION, named, say, titled
 from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.routes.tally import Work
 
@@ -46,14 +46,14 @@ def show(
         return
     out = tables.console()
     tables.show(out, results(rows))
-    for line in remarks(rows):
-        out.print(line, soft_wrap=not out.is_terminal)
+    for line, style in remarks(rows):
+        say(out, line, style)
     for row in rows:
         verdict = judged(row, known)
         if verdict is not None:
-            out.print(f"{titled(row)}: {row['route']}: {verdict.says}", style="yellow", soft_wrap=True)
+            say(out, f"{titled(row)}: {row['route']}: {verdict.says}", "yellow")
     if kept is not None:
-        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
+        say(out, f"kept in {kept}", "dim")
     for row, view in views:
         out.print()
         tables.show(out, gradient(row, view))
@@ -110,11 +110,10 @@ def _work(work: dict[str, int] | None) -> str:
     return "" if work is None else summary(Work(**work))
 
 
-def remarks(rows: Sequence[Row]) -> list[Text]:
-    """The legend, other references, reasons of skipped and failed cases, then notes, each once."""
+def remarks(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Lines and their styles: the legend, other references, reasons of skipped and failed cases, notes, each once."""
     legend = LEGEND.format(UNSTABLE if any(row["unstable"] for row in rows) else "")
-    below = dict.fromkeys([*_references(rows), *_reasons(rows), *_notes(rows)])
-    return [Text(legend, style="dim"), *(Text(line, style=style) for line, style in below)]
+    return [(legend, "dim"), *dict.fromkeys([*_references(rows), *_reasons(rows), *_notes(rows)])]
 
 
 def _references(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
