@@ -10,7 +10,7 @@ DEFAULT := --problem 'bar[n=8|100|1000|10000|100000|1000000]' --problem 'block[n
 CHECKED := adjoint faulty-adjoint
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference clean
+.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline mutants reports reference clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -73,6 +73,9 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.repeat
 	$(BIN)/python -m benchmarks.reporting
 	$(BIN)/python -m benchmarks.killing
+
+mutants: $(READY) ## 60 small faults in problems, routes and the judge: do the tests fail? (hours)
+	$(BIN)/python -m benchmarks.mutants
 
 reports: $(READY) ## everything in results/ as one page, results/report.html; of the reference run where there is no other
 	$(BIN)/routes report --store $(REPORTED) -o results/report.html

@@ -93,7 +93,7 @@ def test_the_two_commands_exist_and_do_what_the_readme_says(folder: Path) -> Non
 def test_make_lists_its_targets() -> None:
     listed = shell("make", ROOT).stdout
     gates = "gate baseline benchmark-regression benchmark-baseline"
-    for target in f"help demo test lint type {gates} benchmark reports reference clean".split():
+    for target in f"help demo test lint type {gates} benchmark mutants reports reference clean".split():
         assert re.search(rf"^{target} ", listed, re.MULTILINE), target
 
 
