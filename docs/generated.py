@@ -19,7 +19,7 @@ import gradient_routes
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.options import options_of
 from gradient_routes.bench.cli import main
-from gradient_routes.bench.store.store import TABLES
+from gradient_routes.bench.store import schema
 from gradient_routes.bench.verification.result import EXIT, INCONCLUSIVE, MEANING, Verdict
 from gradient_routes.problems.problem import OFFERED_AS, offer_names
 from gradient_routes.routes.route import Route
@@ -126,7 +126,7 @@ def tables(title: str = "Tables and columns") -> str:
     )
     body = [
         f"## {name}\n\n" + table(("column", "unit", "meaning"), [(code(c.name), c.unit, plain(c.meaning)) for c in cs])
-        for name, cs in TABLES.items()
+        for name, cs in schema.tables().items()
     ]
     return "\n".join([f"# {title}\n", head, *body])
 
@@ -139,6 +139,8 @@ def python() -> str:
 
 def _public(name: str) -> str:
     target = getattr(gradient_routes, name)
+    if not (inspect.isclass(target) or inspect.isfunction(target)):  # the name of a type
+        return f"## `{name}`\n\n```text\n{target}\n```\n"
     parts = [f"## `{name}`\n", paragraphs(inspect.getdoc(target) or "")]
     if isinstance(target, enum.EnumMeta):
         return "\n".join([*parts, table(("member",), [(code(member),) for member in target.__members__])])

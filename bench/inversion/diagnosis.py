@@ -144,7 +144,7 @@ def _accused(found: Slopes) -> str:
 
 def _if_loose(objective: Objective) -> str:
     solver, problem = objective.model.solver, objective.problem
-    iterates = not problem.linear or solver.linear_solver in ("cg-amg", "krylov", "descent")
+    iterates = not problem.linear or solver.linear.iterates
     if solver.rtol <= LOOSE or not iterates:
         return ""
     return f"; forward solves are as loose as --rtol {solver.rtol:g}: tighten them before blaming it"

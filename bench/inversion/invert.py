@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec, point
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
 from gradient_routes.bench.inversion.optimizers import Limits, Name, optimizer
 from gradient_routes.bench.inversion.variables import Positive, Variables
-from gradient_routes.bench.studies.columns import RUN
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
 from gradient_routes.routes.model import Model
@@ -40,7 +40,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Inversion:
-    """What came of it: columns as in bench.studies.columns, and the arrays behind them.
+    """What came of it: fields are columns of its table, and the arrays behind them.
 
     p, gradient (n_p,) at the end; start p_0; truth where known; view, what the problem shows beside; `end` says why it
     stopped, and `interrupted` that Ctrl-C did; `scaled` says what the optimizer's numbers are in units of, `warning`
@@ -140,7 +140,7 @@ def invert(
     last = history.last
     assert last is not None
     try:
-        shown = view(problem, last, engine.solver, looked_for=not interrupted)
+        shown = view(problem, last, engine.solver, complete=not interrupted)
     except KeyboardInterrupt:  # what was found is not lost with what would be shown beside it
         shown, interrupted = ParameterView(), True
     return Inversion(
@@ -177,19 +177,25 @@ def data(problem: Problem, p: Array) -> Array | None:
     return None if seen is None else seen.data
 
 
-def view(problem: Problem, found: Evaluation, solver: Solver, looked_for: bool = True) -> ParameterView:
-    """What the problem shows beside a gradient, forward and adjoint strain say, and which parameters are blind: as the
-    problem knows, else, where `looked_for`, by one forward and one adjoint solve that nobody counts.
+def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = True) -> ParameterView:
+    """What the problem shows beside the gradient at the end (for the bar, its strains) and the blind parameters.
+
+    A route that returns no state, such as finite differences, costs one forward solve here, and a problem that does
+    not know its blind parameters one forward and one adjoint solve; none of them is counted. Without `complete` only
+    what needs no solve is shown.
     """
-    if Offers.SOLVE not in problem.offers:
+    if Offers.SOLVE not in problem.offers or (found.u is None and not complete):
         return ParameterView()
-    u = problem.initial(found.p) if found.u is None else found.u
+    model, u = Model(problem, solver), found.u
+    try:
+        u = model.solve(found.p).u if u is None else u
+    except OUTSIDE:  # a solve from scratch may fail where the route arrived by small steps
+        return ParameterView()
     shown = problem.view(found.p, u, found.lam)
     seen = problem.observation(u, found.p)
-    if shown.blind is not None or not looked_for or seen is None or not len(seen.data):
+    if shown.blind is not None or not complete or seen is None or not len(seen.data):
         return shown
-    model = Model(problem, solver)
     try:
         return replace(shown, blind=Sensitivity(model, model.solve(found.p)).blind())
-    except OUTSIDE:  # a cold solve may fail where the route came to by small steps: then it is not known
+    except OUTSIDE:
         return shown
