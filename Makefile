@@ -8,7 +8,7 @@ REPORTED := $(if $(wildcard results/routes.sqlite),results/routes.sqlite,results
 MATRIX := --problem bar --problem 'block[n=2]' --problem 'advection[n=4]' --route all --no-timing --jobs 2
 DEFAULT := --problem 'bar[n=8|100|1000|10000|100000|1000000]' --problem 'block[n=4|6|8]' --problem 'advection[n=8|16|32]'
 CHECKED := adjoint faulty-adjoint
-TESTED ?= tests/test_api.py tests/problems tests/routes
+TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference docs clean

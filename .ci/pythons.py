@@ -30,7 +30,7 @@ def installed(minor: str) -> dict[str, str]:
 def passes(version: str, python: str, tests: list[str]) -> bool:
     """Whether the wheel installs, runs and passes the tests there. The environment is kept in .venvs/."""
     bin = ROOT / ".venvs" / version / "bin"
-    pip = [bin / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    pip = [bin / "python", "-m", "pip", "install", "-c", "constraints.txt", "--quiet", "--disable-pip-version-check"]
     shutil.rmtree(ROOT / "build", ignore_errors=True)  # else modules that are gone would be installed
     steps = (
         [python, "-m", "venv", bin.parent],

@@ -1,4 +1,4 @@
-"""The command line: one group and the table of its commands. Nothing heavy is imported before a command needs it."""
+"""The command line: a command for every registered study, and those about a store. It imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
 from gradient_routes.bench.studies.command import command_of
 
-STUDIES = [command_of(study) for study in registry.studies().values()]
 OTHERS: list[click.Command] = [list_, status, report, export, compare, baseline]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
@@ -37,5 +36,5 @@ def main() -> None:
     """
 
 
-for command in (*STUDIES, *OTHERS):
+for command in (*map(command_of, registry.studies().values()), *OTHERS):
     main.add_command(with_completion(command))

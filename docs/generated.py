@@ -158,6 +158,8 @@ def _public(name: str) -> str:
 
 def _call(name: str, target: Callable[..., Any]) -> str:
     """`name(parameters)` with defaults and without annotations, which the text explains; lines of 80 columns."""
+    if inspect.isclass(target) and issubclass(target, Exception):
+        return f"{name}(message)"
     given = inspect.signature(target)
     shown = [q.replace(annotation=q.empty) for q in given.parameters.values() if q.name != "self"]
     signature = str(given.replace(parameters=shown, return_annotation=given.empty))

@@ -8,6 +8,7 @@ invert, identify            minimize J by a route; what the data can say of p
 Store                       what is kept
 Problem, Parameters ...     to write a problem: R(u, p), J(u, p) and their partial derivatives
 Route, route ...            to write a route: from p to (J, dJ/dp)
+Study, Table, Column ...    to write a study: a question, its options, what it keeps and shows
 RoutesError ...             what is raised on purpose, one line each
 
 A problem of one's own, k u + c u^3 = 1 and J = (u - 0.5)^2 / 2 with p = (k, c), by two routes:
@@ -48,7 +49,17 @@ if TYPE_CHECKING:
     from gradient_routes.bench.api import invert as invert
     from gradient_routes.bench.api import run as run
     from gradient_routes.bench.api import vcurve as vcurve
+    from gradient_routes.bench.cases.column import Column as Column
+    from gradient_routes.bench.cases.column import Table as Table
+    from gradient_routes.bench.cases.study import Found as Found
+    from gradient_routes.bench.cases.study import Kept as Kept
+    from gradient_routes.bench.cases.study import Note as Note
+    from gradient_routes.bench.cases.study import Say as Say
+    from gradient_routes.bench.cases.study import Study as Study
+    from gradient_routes.bench.command_options import at_option as at_option
     from gradient_routes.bench.store.store import Store as Store
+    from gradient_routes.bench.studies.options import problem_at as problem_at
+    from gradient_routes.bench.studies.options import problem_option as problem_option
     from gradient_routes.bench.verification.api import assert_gradient as assert_gradient
     from gradient_routes.bench.verification.api import check as check
     from gradient_routes.problems.errors import DomainError as DomainError
@@ -70,25 +81,35 @@ if TYPE_CHECKING:
 
 PUBLIC = {  # name -> the module that defines it, imported when the name is first used
     "Array": "gradient_routes.problems.problem",
+    "Column": "gradient_routes.bench.cases.column",
     "DomainError": "gradient_routes.problems.errors",
     "ForwardWork": "gradient_routes.routes.forward_work",
+    "Found": "gradient_routes.bench.cases.study",
     "InputError": "gradient_routes.problems.errors",
+    "Kept": "gradient_routes.bench.cases.study",
     "Linearization": "gradient_routes.problems.problem",
     "Model": "gradient_routes.routes.model",
     "NotConverged": "gradient_routes.problems.errors",
+    "Note": "gradient_routes.bench.cases.study",
     "Offers": "gradient_routes.problems.problem",
     "Parameters": "gradient_routes.problems.problem",
     "Problem": "gradient_routes.problems.problem",
     "Result": "gradient_routes.routes.route",
     "Route": "gradient_routes.routes.route",
     "RoutesError": "gradient_routes.problems.errors",
+    "Say": "gradient_routes.bench.cases.study",
     "Store": "gradient_routes.bench.store.store",
+    "Study": "gradient_routes.bench.cases.study",
+    "Table": "gradient_routes.bench.cases.column",
     "Traced": "gradient_routes.problems.problem",
     "Work": "gradient_routes.routes.tally",
     "assert_gradient": "gradient_routes.bench.verification.api",
+    "at_option": "gradient_routes.bench.command_options",
     "check": "gradient_routes.bench.verification.api",
     "identify": "gradient_routes.bench.api",
     "invert": "gradient_routes.bench.api",
+    "problem_at": "gradient_routes.bench.studies.options",
+    "problem_option": "gradient_routes.bench.studies.options",
     "route": "gradient_routes.routes.route",
     "run": "gradient_routes.bench.api",
     "vcurve": "gradient_routes.bench.api",

@@ -132,6 +132,17 @@ def test_it_runs_beside_routes_and_files_with_the_names_of_its_floors(installed:
     assert done.stdout.count('"status": "ok"') == 7
 
 
+def test_every_module_of_the_wheel_finds_what_it_imports(installed: Installed) -> None:
+    """Nothing that is installed rests on what is not: tests, benchmarks, examples."""
+    code = (
+        "from importlib import import_module; from pkgutil import walk_packages; import gradient_routes as g\n"
+        "for module in walk_packages(g.__path__, 'gradient_routes.'):\n"
+        "    if not module.name.endswith('__main__'): import_module(module.name)"
+    )
+    done = installed.run("python", "-c", code)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_python_m_is_the_command(installed: Installed) -> None:
     done = installed.run("python", "-m", "gradient_routes", "--help")
     assert (done.returncode, done.stderr) == (0, "")
@@ -158,3 +169,11 @@ def test_the_classifiers_name_the_versions_that_are_tested() -> None:
         line = (ROOT / file).read_text().partition(before)[2].partition("\n")[0]
         assert re.findall(r"3\.\d+", line) == named, file
     assert project["requires-python"] == f">={named[0]}"
+
+
+def test_make_test_pythons_names_tests_that_there_are() -> None:
+    done = subprocess.run(["make", "--dry-run", "test-pythons"], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    _, script, *tests = done.stdout.split()
+    assert len(tests) > 2
+    assert all((ROOT / name).exists() for name in (script, *tests))

@@ -99,6 +99,26 @@ def test_a_broken_linear_solver_is_one_line(site: Path, tmp_path: Path, solver: 
     assert done.stderr.count("\n") == 1
 
 
+def test_a_study_is_one_file_and_one_entry_point(site: Path, tmp_path: Path) -> None:
+    """Its command, its help, its rows in the store, in --json and in exports: no other file knows it."""
+    assert "symmetry" in routes(site, "--help", tmp_path).stdout
+    assert "so that a transposed solve is a plain one?" in " ".join(
+        routes(site, "symmetry --help", tmp_path).stdout.split()
+    )
+    done = routes(site, "symmetry --problem duffing", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("duffing: |R_u v - R_u^T v| / |R_u v| = 0\n")
+    done = routes(site, "symmetry --problem 'advection[n=4]' --json", tmp_path)
+    (row,) = map(json.loads, done.stdout.splitlines())
+    assert done.returncode == 1
+    assert row["table"] == "symmetry"
+    assert row["asymmetry"] > 0.1
+    exported = routes(site, "export --table symmetry", tmp_path).stdout.splitlines()
+    assert exported[0] == "study_id,problem,at,n_state,asymmetry"
+    assert len(exported) == 3
+    assert routes(site, "symmetry", tmp_path).returncode == 2
+
+
 def test_the_example_is_as_short_as_promised() -> None:
     lengths = {p.name: len(p.read_text().splitlines()) for p in (ROOT / "examples" / "plugin" / "duffing").glob("*.py")}
     assert lengths["problem.py"] <= 65

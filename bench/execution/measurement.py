@@ -35,6 +35,8 @@ KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
 SMALL = 1e-6  # relative residual of a state that deserves to be called converged
 WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
 
+FLOAT64 = "compute in float64 (JAX: jax.config.update('jax_enable_x64', True), PyTorch: dtype=torch.float64)"
+
 Report = Callable[[str, Row], None]  # the phase that begins, and what is known of the row
 
 
@@ -171,6 +173,9 @@ def _check(bench: Workbench, route: Route, result: Result, row: Row) -> None:
     """Fill in J and the gradient; raise Failure for numbers that are none."""
     if np.iscomplexobj(result.gradient):
         raise Failure(f"{route.name}: gradient of complex numbers - return the real dJ/dp")
+    given = np.asarray(result.gradient).dtype
+    if given.kind == "f" and given.itemsize < 8:
+        note(row, f"{route.name}: gradient in {given}: {FLOAT64}")
     g = np.asarray(result.gradient, dtype=np.float64)
     if g.shape != bench.p.shape:
         raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(bench.p)} parameters - mend the route")

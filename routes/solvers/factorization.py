@@ -11,7 +11,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.sparse import BlockDiagonal
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.solver import Factorization
@@ -29,15 +29,15 @@ class Factorizer:
         self._factorize = self.solver.start(rtol)
 
     def __call__(self, A: Any, who: str) -> Factorization:
-        """Factorize A: a Chain, Bordered or not, a SymmetricSparse or GeneralSparse, BlockDiagonal of such, a dense
+        """Factorize A: tridiagonal, bordered or not, SymmetricSparse or GeneralSparse, BlockDiagonal of such, a dense
         array or a SciPy sparse matrix. Raises SingularMatrix, and InputError for what the solver cannot solve."""
         if isinstance(A, BlockDiagonal):
             return BlockFactorization(A, lambda block: self(block, who))
         if self.solver.takes(A):
             return self._factorize(A, who)
-        if isinstance(A, Chain):
+        if isinstance(A, Tridiagonal):
             return ChainFactorization(A, who)
-        if isinstance(A, Bordered):
+        if isinstance(A, BorderedTridiagonal):
             return BorderedFactorization(A, who)
         return DenseFactorization(A, who) if isinstance(A, np.ndarray) else SparseFactorization(A, who)
 

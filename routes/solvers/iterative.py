@@ -16,7 +16,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.matrices.sparse import GeneralSparse, SymmetricSparse
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.krylov import ConjugateGradients, dot, norm
 from gradient_routes.routes.solvers.solver import Factorization, Factorize, LinearSolver
@@ -61,7 +61,7 @@ class IterativeFactorization(Factorization):
         self._who, self._method, self.rtol = who, method, rtol
         self._symmetric = A.T is A or (isinstance(A, np.ndarray) and bool((A == A.T).all()))
         self.name = method.named(self._symmetric)
-        known = isinstance(A, Chain | Bordered | SymmetricSparse | GeneralSparse)
+        known = isinstance(A, Tridiagonal | BorderedTridiagonal | SymmetricSparse | GeneralSparse)
         self.norm = float(A.norm if known else abs(A).sum(axis=1).max())
         self._nbytes = int((A if known else A.data).nbytes)
         self._A = A.full().tocsr() if isinstance(A, SymmetricSparse) else A

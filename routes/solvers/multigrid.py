@@ -38,8 +38,8 @@ class MultigridFactorization(Factorization):
             raise SingularMatrix(self._indefinite(f"its diagonal has {A.diagonal[bad[0]]:.3g}"))
         self._A = A.full().tocsr()
         levels = pyamg.smoothed_aggregation_solver(
-            _blocked(self._A, A.pattern.near_kernel),
-            B=A.pattern.near_kernel,
+            _blocked(self._A, A.pattern.near_nullspace),
+            B=A.pattern.near_nullspace,
             symmetry="symmetric",
             improve_candidates=None,  # sweeps that take longer than the solve and save it nothing
         )
@@ -67,13 +67,15 @@ class MultigridFactorization(Factorization):
         return f"{self._who}: R_u is not positive definite ({why}) - take --linear-solver pardiso or superlu"
 
 
-def _blocked(A: Any, near_kernel: Array | None) -> Any:
+def _blocked(A: Any, near_nullspace: Array | None) -> Any:
     """A in blocks of 3 x 3, the unknowns of a node, where the near-kernel begins with the three translations."""
     from scipy.sparse import csr_matrix
 
     n = A.shape[0]
     A = csr_matrix((A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32)), shape=A.shape)
-    by_nodes = near_kernel is not None and n % 3 == 0 and (near_kernel[:, :3] == np.tile(np.eye(3), (n // 3, 1))).all()
+    by_nodes = (
+        near_nullspace is not None and n % 3 == 0 and (near_nullspace[:, :3] == np.tile(np.eye(3), (n // 3, 1))).all()
+    )
     return A.tobsr((3, 3)) if by_nodes else A
 
 

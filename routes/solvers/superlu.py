@@ -9,7 +9,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.sparse import GeneralSparse, SymmetricSparse
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization, Factorize, LinearSolver
 
@@ -72,7 +72,7 @@ def solution_error(A: Any, solve: Callable[[Array], Array]) -> float:
 
 def is_sparse(A: Any) -> bool:
     """Whether A is neither dense nor tridiagonal."""
-    return not isinstance(A, Chain | Bordered | np.ndarray)
+    return not isinstance(A, Tridiagonal | BorderedTridiagonal | np.ndarray)
 
 
 def start(rtol: float) -> Factorize:

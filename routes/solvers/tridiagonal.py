@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gradient_routes.problems.errors import SingularMatrix
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain, cumulative_sum
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal, cumulative_sum
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization
 
@@ -19,9 +19,9 @@ class ChainFactorization(Factorization):
 
     name = "cumulative sums"
 
-    def __init__(self, K: Chain, who: str) -> None:
+    def __init__(self, K: Tridiagonal, who: str) -> None:
         check_positive(K.D, who)
-        self.D, self.tip = K.D, K.tip
+        self.D, self.end_spring = K.D, K.end_spring
         self.norm = K.norm
 
     @property
@@ -29,19 +29,19 @@ class ChainFactorization(Factorization):
         return self.D.nbytes
 
     def substitute(self, b: Array, transposed: bool) -> Array:
-        if not self.tip:
+        if not self.end_spring:
             forces = cumulative_sum(b[::-1])[::-1]  # B^{-T} b: what hangs behind each element
             return cumulative_sum(forces / self.D)
         h, w_N, C = hung(self.D, b)
-        t = (b[-1] - self.tip * w_N) / (1.0 + self.tip * C)
-        return stretched(self.D, h, t, (w_N + C * b[-1]) / (1.0 + self.tip * C))
+        t = (b[-1] - self.end_spring * w_N) / (1.0 + self.end_spring * C)
+        return stretched(self.D, h, t, (w_N + C * b[-1]) / (1.0 + self.end_spring * C))
 
     @property
     def negative_eigenvalues(self) -> int | None:
         """The spring adds k e e^T to a positive definite matrix: one if k is below the -1/C of the chain, else none."""
-        if np.iscomplexobj(self.D) or np.iscomplexobj(self.tip):
+        if np.iscomplexobj(self.D) or np.iscomplexobj(self.end_spring):
             return None
-        return int(1.0 + self.tip * (1.0 / self.D).sum() < 0.0)
+        return int(1.0 + self.end_spring * (1.0 / self.D).sum() < 0.0)
 
 
 class BorderedFactorization(Factorization):
@@ -53,7 +53,7 @@ class BorderedFactorization(Factorization):
 
     name = "cumulative sums, L D L^T"
 
-    def __init__(self, A: Bordered, who: str) -> None:
+    def __init__(self, A: BorderedTridiagonal, who: str) -> None:
         check_positive(A.D, who)
         self.D, self.c, self.active = A.D, A.c, A.active
         self.norm = A.norm

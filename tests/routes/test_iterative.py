@@ -14,7 +14,7 @@ from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.matrices.sparse import BlockDiagonal
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.linearized_solve import LinearizedSolver
@@ -30,10 +30,10 @@ ROUGH = np.exp(RNG.standard_normal(40))
 K = BLOCK.tangent(np.zeros(BLOCK.n_state), START)
 GENERAL = PATTERN.assemble(entries(float))
 MATRICES = {
-    "chain": Chain(ROUGH[:16]),
-    "chain, spring": Chain(ROUGH[:16], 5.0),
-    "chain, multiplier": Bordered(ROUGH[:16], 1.0, True),
-    "chain, free": Bordered(ROUGH[:16], 2.0, False),
+    "chain": Tridiagonal(ROUGH[:16]),
+    "chain, spring": Tridiagonal(ROUGH[:16], 5.0),
+    "chain, multiplier": BorderedTridiagonal(ROUGH[:16], 1.0, True),
+    "chain, free": BorderedTridiagonal(ROUGH[:16], 2.0, False),
     "symmetric": K,
     "dense": np.diag(ROUGH) + 0.1,
     "dense, general": np.diag(ROUGH) + 0.01 * RNG.standard_normal((40, 40)),
