@@ -149,8 +149,11 @@ def _public(name: str) -> str:
         for key, value in vars(target).items()
         if inspect.isclass(target) and inspect.isfunction(value) and value.__doc__ and not key.startswith("_")
     ]
-    listed = [table(("method", "meaning"), methods)] if methods else []
-    return "\n".join([parts[0], f"```text\n{_call(name, target)}\n```\n", *parts[1:], *listed])
+    if methods:
+        parts.append(table(("method", "meaning"), methods))
+    if not (inspect.isclass(target) and issubclass(target, Exception)):
+        parts.insert(1, f"```text\n{_call(name, target)}\n```\n")
+    return "\n".join(parts)
 
 
 def _call(name: str, target: Callable[..., Any]) -> str:

@@ -15,7 +15,7 @@ from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.options import options_of
 from gradient_routes.bench.cases.row import STATUSES
 from gradient_routes.bench.cli import main
-from gradient_routes.bench.store.store import TABLES
+from gradient_routes.bench.store.schema import tables
 from gradient_routes.bench.verification.result import Verdict
 
 GENERATED = runpy.run_path(str(ROOT / "docs" / "generated.py"))
@@ -60,8 +60,8 @@ def test_every_problem_and_route_with_its_options(pages: dict[str, str], kind: r
 
 
 def test_every_column_of_every_table(pages: dict[str, str]) -> None:
-    assert len(TABLES) > 10
-    for name, columns in TABLES.items():
+    assert len(tables()) > 10
+    for name, columns in tables().items():
         part = shown(section(pages["tables.md"], name))
         for column in columns:
             assert f"| `{column.name}` | {column.unit} | {column.meaning} |" in part
