@@ -176,7 +176,7 @@ def test_json_rows_are_complete_and_kept(cli) -> None:
     ran = run(cli, "bar[stop=penalty]", "--json", "--points", "5", route="adjoint")
     rows = ran.rows
     assert ran.code == 0
-    assert all(list(row) == [c.name for c in KINK] for row in rows)
+    assert all(list(row) == ["table", *(c.name for c in KINK)] for row in rows)
     kinds = [row["kind"] for row in rows]
     assert kinds[0] == "event"
     assert {kind: kinds.count(kind) for kind in set(kinds)} == {
@@ -288,7 +288,7 @@ def test_rounded_stops_are_swept_by_every_route(cli, law: str) -> None:
 def test_a_rounded_stop_that_no_route_runs_on_is_swept_without_its_trade(cli) -> None:
     ran = run(cli, "bar[stop=softplus]", "--points", "2", route="unrolled-ad[inner=jacobi]")
     assert (ran.code, ran.err.count("\n")) == (0, 1)
-    assert "what the width costs is left out" in ran.err
+    assert "the cost of the width is left out" in ran.err
 
 
 @pytest.mark.parametrize("law", ["penalty", "softplus"])
@@ -303,7 +303,7 @@ def test_exact_contact_that_cannot_be_solved_leaves_the_sweep(cli) -> None:
     """One step finds the open bar, and no other: at s = 1 it would be closed."""
     ran = run(cli, "bar[stop=quadratic]", "--max-steps", "1", "--points", "3", "--range", "2", "4", "--json")
     assert (ran.code, ran.err.count("\n")) == (1, 1)
-    assert ran.err.startswith("routes: kink: what the stop's law costs is not known: bar: not converged in 1 steps")
+    assert ran.err.startswith("routes: kink: the cost of the contact law is not known: bar: not converged in 1 steps")
     assert [(row["kind"], row["status"]) for row in ran.rows] == [("event", "none")] + 3 * [("point", "ok")]
 
 
