@@ -23,7 +23,7 @@ from gradient_routes.routes.newton import State
 from gradient_routes.routes.route import Options, Result, Route
 
 
-class Workbench:
+class CaseContext:
     """A problem at one p, with what all its routes share: prices and references.
 
     `found` are references known from before. Raises InputError and DomainError, and what the problem raises.

@@ -40,7 +40,7 @@ class Measure:
         from gradient_routes.bench.cases.outcome import Outcome, outdated, unbuilt
         from gradient_routes.bench.cases.sources import changed
         from gradient_routes.bench.cases.status import FOREIGN
-        from gradient_routes.bench.execution.case_context import Workbench
+        from gradient_routes.bench.execution.case_context import CaseContext
         from gradient_routes.bench.execution.measurement import measure
         from gradient_routes.problems.errors import DomainError, InputError
 
@@ -48,7 +48,7 @@ class Measure:
         row = self.row | {"prepare_s": (self.row["prepare_s"] or 0.0) + age()}
         channel.say(Known("the building of its problem", row))
         try:
-            bench = Workbench(self.problem, self.settings, self.found)
+            bench = CaseContext(self.problem, self.settings, self.found)
         except (InputError, DomainError):
             raise
         except FOREIGN as failure:

@@ -19,7 +19,7 @@ from gradient_routes.bench.cases.outcome import Outcome, failed, note
 from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite
-from gradient_routes.bench.execution.case_context import Workbench
+from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Ready, Turn, Turned
@@ -55,7 +55,7 @@ def begun_row(spec: ProblemSpec, route: RouteSpec, settings: Settings) -> Row:
     }
 
 
-def measure(bench: Workbench, spec: RouteSpec, row: Row, report: Report = quiet) -> Measurement | Outcome:
+def measure(bench: CaseContext, spec: RouteSpec, row: Row, report: Report = quiet) -> Measurement | Outcome:
     """One route up to its timing, which comes in turns; an Outcome where there is nothing to time."""
     row |= {"n_param": bench.n_p, "partial": bench.partial}
     try:
@@ -67,13 +67,13 @@ def measure(bench: Workbench, spec: RouteSpec, row: Row, report: Report = quiet)
 
 
 class Measurement:
-    """A route on a Workbench, prepared, called, judged and weighed; its timing comes in turns."""
+    """A route on a CaseContext, prepared, called, judged and weighed; its timing comes in turns."""
 
-    def __init__(self, bench: Workbench, row: Row, result: Result, rounds: Rounds | None, route: Route) -> None:
+    def __init__(self, bench: CaseContext, row: Row, result: Result, rounds: Rounds | None, route: Route) -> None:
         self.bench, self.row, self.result, self.rounds, self.route = bench, row, result, rounds, route
 
     @classmethod
-    def begun(cls, bench: Workbench, spec: RouteSpec, row: Row, report: Report) -> Measurement | Outcome:
+    def begun(cls, bench: CaseContext, spec: RouteSpec, row: Row, report: Report) -> Measurement | Outcome:
         """All but the timing, or the outcome of what does not run or is not paid for."""
         route, p, model = spec.route, bench.p, bench.model()
         objection = route.objection(bench.problem, **spec.options)
@@ -159,14 +159,14 @@ def _skipped(row: Row, reason: str) -> Outcome:
     return Outcome(row | {"status": "skipped", "reason": reason}, environment=environment())
 
 
-def _note_whole(bench: Workbench, route: Route, options: Options, row: Row) -> None:
+def _note_whole(bench: CaseContext, route: Route, options: Options, row: Row) -> None:
     """What a partial run would have cost in full."""
     if bench.partial is not None:
         work = route.cost(bench.n_p, bench.prices.declared, **options)
         note(row, f"{route.name}: whole gradient: predicted {duration(bench.prices.seconds(work))} ({summary(work)})")
 
 
-def _check(bench: Workbench, route: Route, result: Result, row: Row) -> None:
+def _check(bench: CaseContext, route: Route, result: Result, row: Row) -> None:
     """Fill in J and the gradient; raise Failure for numbers that are none."""
     if np.iscomplexobj(result.gradient):
         raise Failure(f"{route.name}: gradient of complex numbers - return the real dJ/dp")
@@ -192,7 +192,7 @@ def _check(bench: Workbench, route: Route, result: Result, row: Row) -> None:
     }
 
 
-def _judge(bench: Workbench, route: Route, row: Row, g: Array) -> None:
+def _judge(bench: CaseContext, route: Route, row: Row, g: Array) -> None:
     """Fill in the error of the gradient, and a warning where it is wrong at a converged state."""
     judge = bench.judges.judge(route)
     if not isinstance(judge, Judge):
@@ -205,7 +205,7 @@ def _judge(bench: Workbench, route: Route, row: Row, g: Array) -> None:
 
 
 def _weigh(
-    bench: Workbench, route: Route, options: Options, gradient: Callable[[], Any], model: Model, row: Row
+    bench: CaseContext, route: Route, options: Options, gradient: Callable[[], Any], model: Model, row: Row
 ) -> None:
     """Count the work of one call and read its memory, apart from timing."""
     before = model.tally.work

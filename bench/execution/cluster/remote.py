@@ -16,7 +16,7 @@ from distributed.core import Status
 
 from gradient_routes.bench.cases.environment import Environment, environment
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.execution.cluster.shipped_case import Sealed
+from gradient_routes.bench.execution.cluster.shipped_case import ShippedCase
 from gradient_routes.bench.execution.executors.isolated import Isolated
 from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -40,7 +40,7 @@ def greeting() -> Greeting:
     return Greeting(socket.gethostname(), os.getpid(), environment())
 
 
-def packed(case: Sealed, limits: Limits, cwd: str) -> bytes:
+def packed(case: ShippedCase, limits: Limits, cwd: str) -> bytes:
     """For carry; Dask looks into anything but bytes."""
     return pickle.dumps((case, limits, cwd))
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Sealed:
+class ShippedCase:
     """Opened by the process that runs it and by no other: to open it imports the code of problem and route.
 
     parts  problem, route and settings, pickled
@@ -67,9 +67,9 @@ class Sealed:
         return time.perf_counter() - start
 
 
-def sealed(job: Measure) -> Sealed:
+def shipped(job: Measure) -> ShippedCase:
     """A case ready to travel."""
     from gradient_routes.bench.cases.case import files
 
     parts = pickle.dumps((job.problem, job.route, job.settings))
-    return Sealed(parts, tuple(map(str, files([job.problem], job.settings.at))), job.row, job.found)
+    return ShippedCase(parts, tuple(map(str, files([job.problem], job.settings.at))), job.row, job.found)

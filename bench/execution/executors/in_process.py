@@ -9,17 +9,17 @@ from functools import cache
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.outcome import Outcome, refused, unbuilt
 from gradient_routes.bench.cases.status import FOREIGN
-from gradient_routes.bench.execution.case_context import Workbench
+from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.executors.running import interleaved
 from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.bench.execution.measurement import Measurement, measure
 from gradient_routes.problems.errors import DomainError, InputError
 
 
-class Here:
+class InProcess:
     """A case under way in this process."""
 
-    def __init__(self, bench: Workbench, job: Measure) -> None:
+    def __init__(self, bench: CaseContext, job: Measure) -> None:
         self._bench, self._job = bench, job
         self._measured: Measurement | None = None
 
@@ -51,13 +51,13 @@ def outcomes(jobs: list[Measure]) -> Iterator[Outcome]:
     settle()
     try:
         with stdout_to_stderr():
-            bench = Workbench(first.problem, first.settings, first.found)
+            bench = CaseContext(first.problem, first.settings, first.found)
     except (InputError, DomainError) as error:
         yield from (refused(job.row, error) for job in jobs)
     except FOREIGN as failure:
         yield from (unbuilt(job.row, job.problem.name, failure) for job in jobs)
     else:
-        yield from interleaved(Here(bench, job) for job in jobs)
+        yield from interleaved(InProcess(bench, job) for job in jobs)
 
 
 @cache

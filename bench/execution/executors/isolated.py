@@ -11,7 +11,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
 from gradient_routes.bench.cases.outcome import Outcome, refused
 from gradient_routes.bench.cases.status import Status
-from gradient_routes.bench.execution.cluster.shipped_case import Sealed
+from gradient_routes.bench.execution.cluster.shipped_case import ShippedCase
 from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.channel import Call
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -33,7 +33,7 @@ from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.bench.execution.references import Found
 from gradient_routes.problems.errors import InputError, RoutesError
 
-Case = Measure | Sealed
+Case = Measure | ShippedCase
 
 
 class Isolated:
