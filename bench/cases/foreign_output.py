@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -45,5 +44,7 @@ def _redirect(descriptor: int) -> None:
     """Descriptor 1 to another one, what C still holds back written where it was meant to go."""
     if descriptor >= 0:
         if os.name == "posix":
+            import ctypes
+
             ctypes.CDLL(None).fflush(None)
         os.dup2(descriptor, 1)

@@ -27,15 +27,27 @@ class View:
 
 
 @dataclass(frozen=True)
+class Sensitivities:
+    """du/dp or d(S u)/dp, `values` (rows, k), of the parameters named, and what a row is of."""
+
+    name: str
+    rows: list[str]
+    parameters: list[str]
+    units: list[str]
+    values: Array
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """A row and its raw timings, what --gradient and --vtu show, the environment of its process, the bad input, if that
-    is why it failed, and the place of the case in its sweep: outcomes come as they can.
+    """A row and its raw timings, what --gradient, --vtu and --sensitivities show, the environment of its process, the
+    bad input, if that is why it failed, and the place of the case in its sweep: outcomes come as they can.
     """
 
     row: Row
     samples: Samples | None = None
     view: View | None = None
     fields: Fields | None = None
+    sensitivities: Sensitivities | None = None
     environment: Environment | None = None
     refusal: RoutesError | None = None
     place: int = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, entry_points
 from typing import Any, Literal
 
 from gradient_routes.bench.cases.column import Table
@@ -13,7 +13,6 @@ from gradient_routes.bench.cases.imported import imported, is_reference
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.problems.errors import InputError
-from gradient_routes.routes.route import Route
 
 Kind = Literal["problem", "route", "study"]
 GROUPS = {"problem": "gradient_routes.problems", "route": "gradient_routes.routes", "study": "gradient_routes.studies"}
@@ -45,10 +44,10 @@ class Entry:
     @property
     def origin(self) -> str:
         """The distribution that registered it."""
-        return self.point.dist.name if self.point.dist else self.point.name
+        return distribution_name(self.point.dist) if self.point.dist else self.point.name
 
     def load(self) -> Any:
-        """The factory of a problem, or the Route. Raises InputError with the reason if that fails."""
+        """The factory of a problem, the Route or the Study. Raises InputError with the reason if that fails."""
         try:
             target = self.point.load()
         except InputError:
@@ -59,7 +58,7 @@ class Entry:
                 f"{self.kind} '{self.name}' of {self.origin} cannot be imported: {type(error).__name__}: {said}"
                 f" - mend or uninstall {self.origin}"
             ) from error
-        if self.kind == "route" and not isinstance(target, Route):
+        if self.kind == "route" and not is_route(target):
             raise InputError(f"route '{self.name}' of {self.origin} is no Route - decorate its function with @route")
         if self.kind == "route" and isinstance(self.point, EntryPoint) and target.name != self.name:
             raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
@@ -81,6 +80,12 @@ class Entry:
         except InputError as error:
             return str(error)
         return None
+
+
+@cache
+def distribution_name(distribution: Distribution) -> str:
+    """Its name, which Python parses all its metadata for."""
+    return distribution.name
 
 
 @cache
@@ -152,5 +157,11 @@ def find(kind: Kind, name: str) -> Entry:
 
 def factory_of(target: Any) -> Callable[..., Any]:
     """What declares the options: a route's function, or the problem's factory itself."""
-    function: Callable[..., Any] = target.function if isinstance(target, Route) else target
+    function: Callable[..., Any] = target.function if is_route(target) else target
     return function
+
+
+def is_route(target: Any) -> bool:
+    from gradient_routes.routes.route import Route  # NumPy with it: `routes --help` starts without
+
+    return isinstance(target, Route)

@@ -145,7 +145,8 @@ class Measurement:
             }
         with undisturbed():
             view, fields = self.bench.view(self.route, self.result), self.bench.fields(self.result)
-        return Outcome(self.row | {"status": "ok"}, samples, view, fields, environment())
+            columns = self.bench.sensitivities()
+        return Outcome(self.row | {"status": "ok"}, samples, view, fields, columns, environment())
 
 
 @contextmanager
@@ -177,10 +178,7 @@ def _check(bench: CaseContext, route: Route, result: Result, row: Row) -> None:
     if bad.size:
         first = f"{bench.problem.parameters.label(int(bad[0]))} = {g[bad[0]]}"
         raise NonFinite(f"{route.name}: {bad.size} of {g.size} gradient components not finite, first {first} - check p")
-    J = result.J
-    if J is None:
-        J = bench.objective()
-        note(row, f"{route.name}: objective from 1 forward solve apart")
+    J = bench.objective() if result.J is None else result.J
     if not np.isfinite(J):
         raise NonFinite(f"{route.name}: J = {J} - check p and the data")
     row |= {

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from commands import FAULTY, Shell, ended, eventually, faulty, sigint_ignored
 
-from gradient_routes.bench.cli import KEEPING
+from gradient_routes.bench.commands.group import KEEPING
 from gradient_routes.bench.execution import limited
 from gradient_routes.bench.execution.isolation import process as watching
 from gradient_routes.bench.execution.limited import FINISHED
