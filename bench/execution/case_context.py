@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,25 @@ from gradient_routes.problems.problem import Array, Fields, Offers, ParameterVie
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 from gradient_routes.routes.route import Options, Result, Route
+from gradient_routes.routes.tally import Work
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a route will cost: wall time, bytes of tape, work; and why it exceeds the budget, None where it does not."""
+
+    seconds: float
+    tape: float | None
+    work: Work
+    objection: str | None
+
+    @property
+    def columns(self) -> Row:
+        return {
+            "predicted_s": self.seconds,
+            "predicted_tape_bytes": self.tape,
+            "predicted_work": asdict(self.work),
+        }
 
 
 class CaseContext:
@@ -42,8 +61,9 @@ class CaseContext:
             check_columns(settings.columns, self.problem.name, self.n_p)
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
-        direct = replace(settings.solver, linear_solver="auto", newton="full")  # a judge is no fellow of the judged
-        self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_judge, found)
+        # references must not share the errors of the solver that the routes use
+        direct = replace(settings.solver, linear_solver="auto", newton="full")
+        self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_reference, found)
         self._forward_model = self.model()
         self._priced: tuple[Prices, State | None] | Exception | None = None
 
@@ -58,19 +78,14 @@ class CaseContext:
     def model(self) -> Model:
         return Model(self.problem, self.settings.solver)
 
-    def predict(self, n_p: int, route: Route, options: Options, row: Row) -> str | None:
-        """Fill in the predicted bill; why it is not paid, or None."""
+    def predict(self, n_p: int, route: Route, options: Options) -> Prediction:
         work = route.cost(n_p, self.prices.declared, **options)
         tape = None if route.tape is None else route.tape(self.problem, **options)
-        row |= {
-            "predicted_s": self.prices.seconds(work),
-            "predicted_tape_bytes": tape,
-            "predicted_work": asdict(work),
-        }
-        return unaffordable(row["predicted_s"], tape, work, self.settings.budget)
+        seconds = self.prices.seconds(work)
+        return Prediction(seconds, tape, work, unaffordable(seconds, tape, work, self.settings.budget))
 
-    def _unaffordable_judge(self, route: Route, n_p: int) -> str | None:
-        return self.predict(n_p, route, route.defaults, {})
+    def _unaffordable_reference(self, route: Route, n_p: int) -> str | None:
+        return self.predict(n_p, route, route.defaults).objection
 
     def price(self) -> tuple[Prices, State | None]:
         """Prices and the state they were measured on; a forward solve that fails is not tried again."""

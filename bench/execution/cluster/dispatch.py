@@ -13,13 +13,14 @@ from queue import Empty, SimpleQueue
 
 from distributed import CancelledError, Client, Future, KilledWorker
 
-from gradient_routes.bench.cases.outcome import Outcome, failed, note
+from gradient_routes.bench.cases.outcome import Outcome, Record, noted
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.cluster.dask_workers import DaskWorkers, Member, Tell, sent
 from gradient_routes.bench.execution.cluster.remote import packed
 from gradient_routes.bench.execution.cluster.shipped_case import shipped
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.signals import Interrupt
-from gradient_routes.bench.execution.measure_job import Measure
+from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.problems.errors import RoutesError
 
 TICK = 0.5  # [s] between two looks at who is there
@@ -41,6 +42,13 @@ class Attempt:
     lost: Lost
     member: Member
     future: Future[bytes | None]
+
+    @property
+    def record(self) -> Record:
+        """What is known here: its host."""
+        record = Record(self.job.asked)
+        record.add({"host": self.member.greeting.hostname})
+        return record
 
 
 class Dispatch:
@@ -125,8 +133,8 @@ class Dispatch:
         except (CancelledError, KilledWorker):
             outcome, found = None, {}
         except Exception as error:  # of Dask or of the worker: the case itself tells in its row
-            row = failed(attempt.job.row, f"{attempt.job.row['route']} on worker {attempt.member.address}", error)
-            outcome, found = Outcome(row | {"host": attempt.member.greeting.hostname}), {}
+            who = f"{attempt.job.name} on worker {attempt.member.address}"
+            outcome, found = attempt.record.failed(error, who), {}
         if outcome is None:
             self._workers.forget(attempt.member.address)
             yield from self._lose(attempt)
@@ -159,17 +167,14 @@ class Dispatch:
             self._waiting.insert(0, (attempt.job, lost))
             return
         where = ", ".join(member.address for member in lost)
-        row = attempt.job.row | {
-            "status": "crashed",
-            "reason": f"{attempt.job.row['route']}: {len(lost)} workers were lost with it: {where} - see their logs",
-            "host": attempt.member.greeting.hostname,
-        }
-        yield self._signed(Outcome(row), attempt.member, ())
+        reason = f"{attempt.job.name}: {len(lost)} workers were lost with it: {where} - see their logs"
+        yield self._signed(attempt.record.ended(Status.CRASHED, reason), attempt.member, ())
 
     def _signed(self, outcome: Outcome, member: Member, lost: Lost) -> Outcome:
         """With the machine it comes from, if it does not tell itself, and what was lost on the way."""
         if lost:
-            note(outcome.row, f"begun {len(lost) + 1} times, workers were lost: {', '.join(m.address for m in lost)}")
+            said = f"begun {len(lost) + 1} times, workers were lost: {', '.join(m.address for m in lost)}"
+            outcome = replace(outcome, row=outcome.row | {"note": noted(outcome.row["note"], said)})
         if outcome.environment is None:
             return replace(outcome, environment=member.greeting.environment)
         return outcome
