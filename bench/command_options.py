@@ -13,15 +13,17 @@ from click.core import ParameterSource
 
 from gradient_routes.bench.sanitize import plain
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.solvers.registry import DEFAULT, points
 
 if TYPE_CHECKING:
-    from gradient_routes.routes.newton import Newton
-    from gradient_routes.routes.solvers.factorization import LinearSolver
+    from gradient_routes.routes.newton import Newton, Solver
 
 STORE = Path("results") / "routes.sqlite"
+FINISHED = "what is finished is printed, and kept unless --no-store"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (in quotes: [ and | are special to shells) or all. May be repeated."
 AT = "Point p of the gradient; a file has a header line and n_p values in one column."
-LINEAR_SOLVERS = ["auto", "pardiso", "superlu", "cg-amg", "krylov", "descent"]
+LINEAR_SOLVERS = [*points()]
+NEWTONS = ["full", "inexact"]
 ITERATIVE = "Linear solver; krylov and descent are iterative, for any matrix, and stop at --rtol."
 NEWTON = "Factorize at every Newton step, or keep the factors and iterate with them."
 
@@ -42,11 +44,9 @@ max_steps_option = click.option(
     "--max-steps", type=int, default=50, show_default=True, help="Forward solve: largest number of Newton steps."
 )
 linear_solver_option = click.option(
-    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default="auto", show_default=True, help=ITERATIVE
+    "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default=DEFAULT, show_default=True, help=ITERATIVE
 )
-newton_option = click.option(
-    "--newton", type=click.Choice(["full", "inexact"]), default="full", show_default=True, help=NEWTON
-)
+newton_option = click.option("--newton", type=click.Choice(NEWTONS), default="full", show_default=True, help=NEWTON)
 
 
 Command = Callable[..., Any]
@@ -63,14 +63,22 @@ def solver_options(command: Command) -> Command:
     """Options of the forward solve, passed to the command as one `solver`. Raises InputError."""
 
     @wraps(command)
-    def with_solver(*, rtol: float, max_steps: int, linear_solver: LinearSolver, newton: Newton, **others: Any) -> Any:
-        from gradient_routes.routes.newton import Solver
-
-        if not 0 < rtol < 1 or max_steps < 1:
-            raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
-        return command(solver=Solver(rtol, max_steps, linear_solver, newton), **others)
+    def with_solver(*, rtol: float, max_steps: int, linear_solver: str, newton: Newton, **others: Any) -> Any:
+        return command(solver=solver_of(rtol, max_steps, linear_solver, newton), **others)
 
     return rtol_option(max_steps_option(linear_solver_option(newton_option(with_solver))))
+
+
+def solver_of(rtol: float = 1e-12, max_steps: int = 50, linear_solver: str = "auto", newton: Newton = "full") -> Solver:
+    """The forward solve that these options ask for. Raises InputError."""
+    from gradient_routes.routes.newton import Solver
+
+    if not 0 < rtol < 1 or max_steps < 1:
+        raise InputError(f"--rtol {rtol:g} --max-steps {max_steps} - give 0 < rtol < 1 and at least one step")
+    for what, given, known in (("linear-solver", linear_solver, LINEAR_SOLVERS), ("newton", newton, NEWTONS)):
+        if given not in known:
+            raise InputError(f"--{what} {given} - choose from {', '.join(known)}")
+    return Solver(rtol, max_steps, linear_solver, newton)
 
 
 def store_options(command: Command) -> Command:

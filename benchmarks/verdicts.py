@@ -51,7 +51,7 @@ def main() -> None:
         found = vcurve(problem)
         for reading in found.readings:
             out.print(
-                f"{name}, {reading.sweep.line.name}: central floor {number(reading.central.floor, 2)} (<= {wanted:g}),"
+                f"{name}, {reading.name}: central floor {number(reading.central.floor, 2)} (<= {wanted:g}),"
                 f" slope {number(reading.central.slope)}; one-sided floor {number(reading.one_sided.floor, 2)},"
                 f" slope {number(reading.one_sided.slope)}",
                 soft_wrap=True,

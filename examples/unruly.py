@@ -1,4 +1,4 @@
-"""A solver as it may come from elsewhere: it crashes, hangs or takes all the memory there is."""
+"""A solver that crashes, hangs or takes all memory, to see what the limits of a sweep do."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gradient_routes.problems.problem import Array, Offers, Parameters, Problem
+from gradient_routes import Array, Offers, Parameters, Problem
 
 
 class Solver(Problem):
-    """J = |p|^2 / 2, by code nobody should have to trust."""
+    """J = |p|^2 / 2, by code that fails in the way asked for."""
 
     name = "unruly"
     offers = Offers.VALUE
@@ -20,7 +20,7 @@ class Solver(Problem):
         self,
         *,
         n: Annotated[int, "parameters"] = 2,
-        does: Annotated[Literal["well", "crash", "hang", "hoard"], "what becomes of a solve"] = "well",
+        does: Annotated[Literal["well", "crash", "hang", "hoard"], "what every solve does"] = "well",
     ) -> None:
         self.does = does
         self.parameters = Parameters(start=np.ones(n), scale=np.ones(n))

@@ -1,8 +1,8 @@
-"""The bar: N two-node elements in a row, fixed at x = 0, pulled at x = L, one modulus each.
+"""The bar: N two-node elements, fixed at x = 0, loaded at x = L, with one modulus per element.
 
 K(E) u = f,    k_e = E_e A / L_e [[1, -1], [-1, 1]],    f = F at node N,    K = B^T diag(E A / L_e) B
 
-Beyond the tip there may be a stop (problems/contact.py): its force makes the problem nonlinear, and not smooth.
+An optional stop beyond the tip (problems/contact.py) makes the problem nonlinear and nonsmooth.
 """
 
 from __future__ import annotations
@@ -14,16 +14,15 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from gradient_routes.problems.contact import GAP, K_C, WIDTH, Stop, StopName, stop_of
+from gradient_routes.problems.contact import GAP, K_C, STOP_WIDTH, Stop, StopName, make_stop
 from gradient_routes.problems.data.observation import Candidates, Observation, selection
-from gradient_routes.problems.data.regularization import WIDTH as JUMP
-from gradient_routes.problems.data.regularization import FieldPhi, Prior
-from gradient_routes.problems.data.sensors import Nodes, Sensors, measured, parse_nodes
+from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
+from gradient_routes.problems.data.sensors import Nodes, Sensors, parse_nodes, read_sensors
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.matrices.tridiagonal import (
-    Bordered,
-    Chain,
+    BorderedTridiagonal,
     ElementForces,
+    Tridiagonal,
     cumulative_sum,
     difference,
     divergence,
@@ -40,15 +39,14 @@ from gradient_routes.problems.problem import (
 )
 
 L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
-THETA_MAX = 170.0  # E = exp(theta) < 1e74: the squares and cubes of E in J and dJ/dE stay in float64's range
-
-N_MAX = 10**7  # a gradient then takes 1 GB
+THETA_MAX = 170.0  # E = exp(theta) < 1e74: E^2 and E^3 in J and dJ/dE stay in float64's range
+N_MAX = 10**7  # a gradient takes 1 GB
 
 
 def true_modulus(x: Array) -> Array:
-    """The modulus [Pa] behind synthetic data: a smooth field with a soft inclusion, half as stiff, at x = 0.35.
+    """The modulus [Pa] that synthetic data are computed from: a smooth field with a soft inclusion at x = 0.35.
 
-    Nowhere near the start E = 1 at the clamp: sensors there would see a misfit that is all rounding.
+    It differs from the start E = 1 near the clamp, where the misfit would otherwise be all rounding.
     """
     return (1.3 + 0.2 * np.sin(2.0 * np.pi * x)) * (1.0 - 0.5 * np.exp(-(((x - 0.35) / 0.1) ** 2)))
 
@@ -56,12 +54,11 @@ def true_modulus(x: Array) -> Array:
 class Bar(Problem):
     """A bar whose moduli are sought from displacements: the smallest problem with a blind spot.
 
-    State u (N,) [m], displacement of nodes 1..N; parameters theta = log E or E itself (N,), E in Pa.
-    Elements behind the last sensor carry load but move no sensor: their data gradient is exactly 0, unless the tip
-    touches a stop, whose force they share in. With stop=multiplier the state ends with that force [N]. Synthetic data
-    are read from the bar with its stop.
-    Strains are differences of displacements, so with sensors far from the clamp gradients are good to eps N, not eps:
-    4e-11 at N = 10^6 with a sensor at every node, 1e-16 with five next to the clamp.
+    State u (N,) [m], displacements of nodes 1..N, followed by the contact force [N] if stop=multiplier. Parameters
+    theta = log E or E (N,), E in Pa. Elements behind the last sensor do not influence the data: their data gradient is
+    exactly 0 unless the tip touches the stop. Synthetic data are computed with the stop.
+    Strains are differences of displacements, so with sensors far from the clamp the gradient has a relative error of
+    eps N instead of eps: 4e-11 at N = 10^6 with a sensor at every node, 1e-16 with five next to the clamp.
     """
 
     name = "bar"
@@ -80,15 +77,15 @@ class Bar(Problem):
         seed: Annotated[int, "of that noise"] = 0,
         alpha: Annotated[float, "weight of Phi"] = 0.0,
         phi: Annotated[FieldPhi, "1/2 |D log E|^2, D between neighbours, or total variation of log E"] = "tikhonov",
-        phi_width: Annotated[float, "jump of log E below which total variation is rounded"] = JUMP,
+        phi_width: Annotated[float, "jump of log E below which total variation is rounded"] = PHI_WIDTH,
         stop: Annotated[StopName, "beyond the tip; multiplier: rigid, the others yield by k_c"] = "none",
         gap: Annotated[float, "that the tip may move before it meets the stop [m]"] = GAP,
         k_c: Annotated[float, "stiffness of a stop that yields [N/m]"] = K_C,
-        width: Annotated[float, "over which softplus and quadratic round the kink of the penalty [m]"] = WIDTH,
+        width: Annotated[float, "over which softplus and quadratic round the kink of the penalty [m]"] = STOP_WIDTH,
     ) -> None:
         if not 1 <= n <= N_MAX:
             raise InputError(f"bar: n={n} elements - choose n >= 1 and <= {N_MAX}")
-        check_applies("bar", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != JUMP}))
+        check_applies("bar", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != PHI_WIDTH}))
         self.regularization = Prior(alpha, phi, phi_width)
         self.regularization.check("bar")
         if not (noise >= 0 and math.isfinite(noise)):
@@ -98,7 +95,7 @@ class Bar(Problem):
         if data is not None and noise > 0:
             raise InputError("bar: noise= is added to synthetic data only - drop it or drop data=")
         self.n, self.n_state, self.structure = n, n, "spd"
-        self._meet(stop_of(stop, gap, k_c, width, "bar"))
+        self._set_stop(make_stop(stop, gap, k_c, width, "bar"))
         self.log = parametrization == "log"
         self.L_e = L / n
         self.f = np.zeros(n)  # [N]
@@ -106,7 +103,7 @@ class Bar(Problem):
         self.x = (np.arange(n) + 0.5) * self.L_e  # element centres [m]
         self.synthetic, self.noise = data is None, noise
         if data is not None:
-            self.sensors = measured(data, n, sensors, "bar")
+            self.sensors = read_sensors(data, n, sensors, "bar")
         else:
             nodes = parse_nodes(min(5, n) if sensors is None else sensors, n, "bar")
             S = cumulative_sum(self.L_e / (A * true_modulus(self.x)))
@@ -121,41 +118,41 @@ class Bar(Problem):
             label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
             position=self.x[:, None],
         )
-        self._look()
+        self._update_notes()
 
-    def _look(self) -> None:
-        """What the sensors leave unseen."""
+    def _update_notes(self) -> None:
+        """Recomputes last_sensor and notes after the sensors or the stop have changed."""
         self.last_sensor = int(self.sensors.nodes.max(initial=0))
         self.notes = self._notes()
 
-    def _meet(self, stop: Stop | None) -> None:
+    def _set_stop(self, stop: Stop | None) -> None:
         self.stop = stop
         if stop is not None:
-            self.n_state, self.structure = self.n + stop.multipliers, stop.structure
-            self.linear, self.line_search = False, False  # q is convex: full steps converge, from one side
+            self.n_state, self.structure = self.n + stop.n_multipliers, stop.structure
+            self.linear, self.line_search = False, False  # q is convex: full Newton steps converge monotonically
 
-    def behind(self, stop: Stop) -> Bar:
-        """This bar with the same data and another stop, whose effect on them is so left out."""
+    def with_stop(self, stop: Stop) -> Bar:
+        """This bar with another stop but unchanged data."""
         other = copy(self)
-        other._meet(stop)
+        other._set_stop(stop)
         other.notes = other._notes()
         return other
 
     def refined(self, p: Array) -> tuple[Bar, Array] | None:
-        """Every element in two, the same data at the same places."""
+        """Every element split in two, the same data at the same points; None if too many elements."""
         if 2 * self.n > N_MAX:
             return None
         finer = Bar(n=2 * self.n, sensors=0, parametrization="log" if self.log else "raw", alpha=self.alpha)
         finer.regularization = self.regularization
         finer.sensors, finer.synthetic = Sensors(2 * self.sensors.nodes, self.sensors.d), self.synthetic
-        finer._meet(self.stop)
-        finer._look()
+        finer._set_stop(self.stop)
+        finer._update_notes()
         return finer, np.repeat(p, 2)
 
     def _notes(self) -> tuple[str, ...]:
         n_blind, stop = self.n - self.last_sensor, self.stop
         blind = "blind" if stop is None else "blind unless the tip touches the stop"
-        if stop is not None and not stop.fades:
+        if stop is not None and not stop.vanishes_when_open:
             blind = "seen through the force of the stop alone, which is never quite 0"
         notes = [f"{n_blind} of {self.n} elements lie behind the last sensor: {blind}"] if n_blind else []
         if n_blind == self.n:
@@ -165,12 +162,14 @@ class Bar(Problem):
         return tuple(notes)
 
     def _tip_load(self, C: Any) -> tuple[Any, Any]:
-        """T = F - q, what a bar of compliance C [m/N] carries in equilibrium with its stop, and dT/dC."""
+        """T = F - q, the axial force of a bar of compliance C [m/N] in equilibrium with the stop, and dT/dC."""
         if self.stop is None:
             return F, 0.0
         g_0, gap = F * C - self.stop.gap, self.stop.gap
-        g, q, kappa = self.stop.in_series(g_0, C)
-        balance = (F + q) * abs(g + gap) <= (abs(g) + abs(gap)) * abs(F - q)  # which of the two differences loses less
+        g, q, kappa = self.stop.equilibrium(g_0, C)
+        balance = (F + q) * abs(g + gap) <= (abs(g) + abs(gap)) * abs(
+            F - q
+        )  # choose the formula with less cancellation
         T = F - q if balance else (g + gap) / C
         return T, -kappa * T
 
@@ -186,16 +185,16 @@ class Bar(Problem):
         return self.modulus(p, xp) * (A / self.L_e)
 
     def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
-        """R = B^T D B u - f, (N,) [N], and what the stop adds to it."""
+        """R = B^T D B u - f, (N,) [N], plus the contribution of the stop."""
         R = divergence(self.stiffness(p, xp) * difference(u[: self.n], xp), xp) - xp.asarray(self.f)
-        return R if self.stop is None else self.stop.balance(R, u, xp)
+        return R if self.stop is None else self.stop.residual(R, u, xp)
 
-    def tangent(self, u: Array, p: Array) -> Chain | Bordered:
+    def tangent(self, u: Array, p: Array) -> Tridiagonal | BorderedTridiagonal:
         D = self.stiffness(p)
-        return Chain(D) if self.stop is None else self.stop.tangent(D, u)
+        return Tridiagonal(D) if self.stop is None else self.stop.tangent(D, u)
 
     def active_set(self, u: Array, p: Array) -> str | None:
-        """Open or closed, where the force of the stop has a kink."""
+        """open or closed if the contact force has a kink, else None."""
         return None if self.stop is None else self.stop.active_set(u)
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
@@ -216,7 +215,7 @@ class Bar(Problem):
     def integral(self, u: Array, p: Array) -> tuple[float, Array] | None:
         """1/(2 h) of the integral of the squared misfit between the first and the last sensor, and alpha Phi.
 
-        The misfit is linear between neighbouring sensors, h their mean distance: J is a quadrature of it.
+        The misfit is interpolated linearly between sensors, h is their mean distance; J is a quadrature of it.
         """
         integral = self.sensors.integral(u)
         if integral is None:
@@ -229,7 +228,7 @@ class Bar(Problem):
         return Observation(u[at], d, selection(at, self.n_state), sigma=self.noise, label=lambda k: f"u_{nodes[k]}")
 
     def candidates(self) -> Candidates:
-        """The displacement of every node; not the force of a stop."""
+        """The displacement of every node, without the contact force."""
         nodes = np.arange(1, self.n + 1)
         return Candidates(nodes - 1, lambda j: f"u_{nodes[j]}", (nodes * self.L_e)[:, None])
 
@@ -254,19 +253,18 @@ class Bar(Problem):
 
     @classmethod
     def _spectral_bound(cls, D: Any, xp: Any, q: float = 16.0) -> Any:
-        """Gershgorin's max_i 2 K_ii in the q-norm: a bound that stays differentiable where two rows tie."""
+        """Gershgorin's bound max_i 2 K_ii, smoothed by the q-norm to remain differentiable."""
         rows = 2.0 * cls._diagonal(D, xp)
         largest = xp.max(rows)
         return largest * xp.sum((rows / largest) ** q) ** (1.0 / q)
 
     def reference(self, p: Array) -> Reference:
-        """Closed form: u_k = T S_k with the compliances s_e = L_e / (A E_e), their sums S_k = sum_{e <= k} s_e, and the
-
-        tip load T(C), C = S_N, in equilibrium with the stop; T' = dT/dC. Hence
+        """Closed form: u_k = T S_k with the compliances s_e = L_e / (A E_e), their sums S_k = sum_{e <= k} s_e and the
+        axial force T(C), C = S_N, in equilibrium with the stop; T' = dT/dC. Hence
 
         dJ/dE_e = - s_e / E_e (T sum_{sensors k >= e} r_k + T' sum_{sensors k} r_k S_k) + alpha dPhi/dE_e,  r = u - d
 
-        Summed in extended precision where the platform has one (x86), so that it is better than what it judges.
+        Summed in extended precision where the platform has it (x86).
         """
         E = self.modulus(p.astype(np.longdouble))
         s = np.longdouble(self.L_e) / (A * E)
@@ -289,15 +287,15 @@ class Bar(Problem):
         return np.log(E) if self.log else E
 
     def condition(self, p: Array) -> float:
-        """That of equal springs (eigenvalues 4 k sin^2((2 j - 1) pi / (4 N + 2))), times the contrast of the moduli.
+        """Condition number for equal springs (eigenvalues 4 k sin^2((2 j - 1) pi / (4 N + 2))) times the contrast of E.
 
-        A stop adds one eigenvalue, hence one iteration.
+        The stop is neglected: it adds one eigenvalue, hence one iteration.
         """
         D = self.stiffness(p)
         return float(D.max() / D.min()) / math.sin(math.pi / (4 * self.n + 2)) ** 2
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
-        """Forward strain and, for the adjoint, adjoint strain: dJ/dE_e = A L_e eps_e[u] eps_e[lam] (data term)."""
+        """Strain and, with lam, adjoint strain: dJ/dE_e = A L_e eps_e[u] eps_e[lam] (data term)."""
         eps = difference(u[: self.n]) / self.L_e
         columns = {"x": self.x, "E": self.modulus(p), "eps[u]": eps}
         if lam is not None:
@@ -305,5 +303,5 @@ class Bar(Problem):
             columns |= {"eps[lam]": eps_lam, "A L_e eps eps": A * self.L_e * eps * eps_lam}
         mark = "blind, alpha Phi only" if self.alpha else "blind"
         behind = np.arange(self.n) >= self.last_sensor
-        touched = self.stop is not None and self.stop.touched(u)
-        return ParameterView(columns, behind & (not touched), mark)
+        in_contact = self.stop is not None and self.stop.in_contact(u)
+        return ParameterView(columns, behind & (not in_contact), mark)

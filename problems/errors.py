@@ -1,4 +1,4 @@
-"""What can go wrong, in one line each: `<who>: <what happened, with numbers> - <what to do>`."""
+"""Errors, each with a one-line message `<who>: <what happened, with numbers> - <what to do>`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from typing import Any
 
 
 class RoutesError(Exception):
-    """Base of every error this project raises on purpose; its text is one line for the user."""
+    """Base of the errors of this project; the message is one line for the user."""
 
 
 class InputError(RoutesError):
-    """What the user gave (an option, a file, a name) cannot be used; nothing was computed."""
+    """Invalid input: an option, a file or a name. Nothing was computed."""
 
 
 class DomainError(RoutesError):
-    """A parameter, or a finite-difference step from it, lies outside the parameter's domain."""
+    """A parameter or a finite-difference step lies outside the domain of the parameter."""
 
 
 class NotOffered(RoutesError):
@@ -26,13 +26,13 @@ class SingularMatrix(RoutesError):
 
 
 class Overflow(RoutesError):
-    """A number left float64's range on the way."""
+    """A number exceeded the range of float64."""
 
 
 class NotConverged(RoutesError):
     """The forward solve did not reach its tolerance.
 
-    `history` holds the residual norms of all iterations, so that the failure can be judged.
+    `history` holds the residual norms of all iterations.
     """
 
     def __init__(self, message: str, history: tuple[float, ...]) -> None:
@@ -41,7 +41,10 @@ class NotConverged(RoutesError):
 
 
 def check_applies(who: str, *rules: tuple[str, bool, bool, dict[str, Any]]) -> None:
-    """Options that would be ignored: (condition, whether it holds, whether the options need it, whether given)."""
+    """Raises InputError for options that would be ignored.
+
+    A rule is (condition, whether it holds, whether the options need it or exclude it, {option: whether given}).
+    """
     for condition, holds, needed, options in rules:
         given = [name for name, value in options.items() if value]
         if given and holds != needed:

@@ -1,7 +1,4 @@
-"""The one place where JAX is imported: before any array is made, in float64, on the CPU unless told otherwise.
-
-On the CPU it runs in the thread that calls.
-"""
+"""The only module that imports JAX: in float64, on the CPU unless JAX_PLATFORMS says otherwise, synchronously."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]  # JAX gives update no types
-# a kernel of 30 us run by another thread takes 45 or 80 us, as it comes
+# asynchronous dispatch makes a kernel of 30 us take 45 to 80 us
 jax.config.update("jax_cpu_enable_async_dispatch", False)  # type: ignore[no-untyped-call]
 
 __all__ = ["jax", "jnp"]

@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ from typing import Any
 CACHE = Path(__file__).parent.parent / ".pytest_cache" / "jax"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(CACHE))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
-# tests compile more than they compute: no optimization, and the emitters that compile in two thirds of the time
-os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false")
+# tests compile more than they compute: no optimization, and the emitters that compile in two thirds of the time, which
+# newer versions of jaxlib do not have: they end the process at a flag that they do not know
+EMITTERS = " --xla_cpu_use_fusion_emitters=false" if version("jaxlib").startswith("0.10.") else ""
+os.environ.setdefault("XLA_FLAGS", f"--xla_backend_optimization_level=0{EMITTERS}")
 
 gc.set_threshold(50_000)  # what JAX traces lives on: looking through it at every 700 objects finds nothing
 

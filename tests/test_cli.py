@@ -185,6 +185,24 @@ def test_an_overflowing_tape_is_a_failed_row_not_a_nan(cli, tmp_path: Path) -> N
     assert ran.rows[1]["status"] == "ok"
 
 
+SINGLE = """
+import numpy as np
+from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.route import Offers, route
+
+@route("single", needs=Offers.LINEARIZE, cost=lambda n_p, forward: adjoint.cost(n_p, forward, factors="refined"))
+def single(model, p):
+    return (result := adjoint.function(model, p))._replace(gradient=result.gradient.astype(np.float32))
+"""
+
+
+def test_a_gradient_in_single_precision_is_told_how_to_get_double(cli, tmp_path: Path) -> None:
+    (tmp_path / "single.py").write_text(SINGLE)
+    noted = {row["route"]: row["note"] for row in run(cli, "--json", "--route", "single.py:single").rows}
+    assert "single: gradient in float32: compute in float64 (JAX: jax.config" in noted["single.py:single"]
+    assert "float64" not in noted["adjoint"]
+
+
 def test_a_step_out_of_the_domain_fails_its_case_only(cli, tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text("E\n" + "1e-9\n" * 8)
     ran = cli("run", "--problem", "bar[parametrization=raw]", "--route", "fd-central", "--route", "adjoint", "--json",

@@ -1,1 +1,1 @@
-"""Verbs that are not studies: what exists, what a store holds, and what changed."""
+"""Commands that are not studies: list, status, report, export, compare, baseline; and the group of all commands."""

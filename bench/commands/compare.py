@@ -1,4 +1,4 @@
-"""`routes compare` and `routes baseline`: is anything worse than it was?"""
+"""`routes compare` and `routes baseline`: find regressions."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 BASELINE = Path("results") / "baseline.json"
 PATH = click.Path(path_type=Path)
-FACTOR = "By which the median ratio of times must grow, beside a test by ranks, to be worse."
-SUBSET = "NEW need not hold all that BASE holds, nor run what another --budget skips."
-EXPECTED = "File of expected failures. [expected.toml beside NEW, if there is one]"
+FACTOR = "Times are worse if their median grows by this factor and a rank test confirms it."
+SUBSET = "Allow NEW to lack cases of BASE and to skip cases under another --budget."
+EXPECTED = "File of known failures. [expected.toml beside NEW, if it exists]"
 
 
 @click.command()
 @click.argument("base", type=PATH)
 @click.argument("new", type=PATH)
-@click.option("--format", type=click.Choice(["table", "md", "json"]), help="[that of FILE's name, else table]")
+@click.option("--format", type=click.Choice(["table", "md", "json"]), help="[by the suffix of FILE, else table]")
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="File to write [stdout].")
 @click.option("--factor", type=float, default=1.25, show_default=True, help=FACTOR)
 @click.option("--subset", is_flag=True, help=SUBSET)
@@ -40,20 +40,24 @@ def compare(
     subset: bool,
     expected: Path | None,
 ) -> None:
-    """Is NEW worse than BASE? Stores, or baselines that `routes baseline` wrote; the latest row of every case counts.
+    """Find what is worse in NEW than in BASE.
+
+    BASE and NEW are stores or files of `routes baseline`; the latest row of every case is compared. Worse is:
 
     \b
-    status   worse where a case fails or is no longer run that did not, but for those that expected.toml names
-    work     exact: more of any count is worse
-    error    worse by an order of magnitude, from 1e-13 on
-    verdict  exact
-    memory   worse by 25 % and 5 MiB; bytes of tapes and factors by 10 %; no longer measured
-    time     in forward solves of the same run: worse by ranks of all rounds and by --factor;
-             not compared between different machines. Seconds are shown, never judged.
+    status   a case that was answered and now fails, or that was ok and is no
+             longer run, unless expected.toml names it
+    work     any count that is larger
+    error    an order of magnitude more, above 1e-13
+    verdict  any other verdict
+    memory   25 % and 5 MiB more; for tapes and factors 10 %
+    time     relative to a forward solve of the same run: by --factor and a
+             rank test of all rounds; not compared between different machines
+    missing  a case or a number of BASE that NEW does not have
 
-    A case of BASE that NEW lacks is worse, too, and no case that is ok in both is an error.
+    Seconds are shown but not compared. There must be a case that is ok in both.
 
-    Exit code: 0 nothing is worse, 1 a regression, 2 wrong usage.
+    Exit code: 0 if nothing is worse, 1 for a regression, 2 for wrong usage.
     """
     from gradient_routes.bench.cases import expected as expectations
     from gradient_routes.bench.regression.baseline import measured
@@ -77,7 +81,7 @@ def _format_of(output: Path | None) -> str:
 
 
 def _write(found: Comparison, format: str, output: Path | None) -> None:
-    """To stdout, or to the file and the conclusion to stdout."""
+    """Print the comparison, or write it to the file and print its conclusion."""
     from gradient_routes.bench.regression.text import as_json, markdown
     from gradient_routes.bench.regression.view import conclusion, show_comparison
     from gradient_routes.bench.render.terminal.tables import console
@@ -97,7 +101,10 @@ def _write(found: Comparison, format: str, output: Path | None) -> None:
 @store_option
 @debug_option
 def baseline(output: Path, store: Path) -> None:
-    """Write the latest row of every case and verdict of a store as a small text file, for `routes compare`."""
+    """Write a small text file for `routes compare`.
+
+    It holds the latest row of every case and every verdict of a store.
+    """
     from gradient_routes.bench.regression.baseline import write
     from gradient_routes.bench.regression.measured import of_store
     from gradient_routes.bench.store.output_files import check_writable

@@ -10,13 +10,11 @@ from typing import Any, NoReturn
 
 import click
 
-from gradient_routes.bench.command_options import complain, debugging
-from gradient_routes.bench.execution.limited import FINISHED, Inside
+from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 READING = ("compare", "baseline", "status", "report", "export")  # commands that run no code of others: input is wrong
-KEEPING = ("run", "tolerance", "scaling", "invert")  # commands that keep what they have when they are interrupted
 
 
 class Routes(click.Group):
@@ -27,13 +25,11 @@ class Routes(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         prepare_streams()
-        inside = ctx.obj if isinstance(ctx.obj, Inside) else None
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
-            if inside is None or not inside.expired:
-                kept = FINISHED if ctx.invoked_subcommand in KEEPING else "nothing is kept"
-                complain(f"interrupted - {kept}{' '.join(map(str, interrupt.args))}")
+            kept = FINISHED if ctx.invoked_subcommand == "run" else "nothing is kept"  # studies say so themselves
+            complain(f"interrupted - {kept}{' '.join(map(str, interrupt.args))}")
             leave(INTERRUPTED)
         except click.UsageError as error:
             about = error.ctx.command_path if error.ctx else "routes"
@@ -45,17 +41,8 @@ class Routes(click.Group):
             command = ctx.invoked_subcommand
             if debugging():
                 traceback.print_exc()
-            if inside is not None and exhausted(failure):
-                raise  # the process that watches this one says so and keeps it
             complain(said(failure, command))
             ctx.exit(code(failure, command))
-
-
-def exhausted(failure: BaseException) -> bool:
-    """Whether an error that is not ours says that memory was not enough."""
-    from gradient_routes.bench.cases.status import status_of
-
-    return not isinstance(failure, RoutesError | OSError) and status_of(failure) == "out-of-memory"
 
 
 def said(failure: BaseException, command: str | None) -> str:

@@ -1,4 +1,4 @@
-"""`routes list`: what exists, its options, what it offers or needs, and what cannot be imported."""
+"""The blocks of `routes list`: a name, its equation, what it offers or needs, its options."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gradient_routes.routes.route import Route
 
 
 def listing(kind: registry.Kind) -> Group:
-    """All problems or all routes, one block each."""
+    """All problems or all routes."""
     blocks: list[Any] = [Text(f"{kind}s", style="bold")]
     for entry in registry.registered(kind):
         blocks.append(Padding(_block(kind, entry), (0, 0, 1, 2), expand=False))

@@ -1,4 +1,4 @@
-"""`routes status`: what a store holds, and what of it is stale."""
+"""`routes status`: the status of every case of a store."""
 
 from __future__ import annotations
 
@@ -10,17 +10,22 @@ from gradient_routes.bench.command_options import debug_option, store_option
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a case: its row and what it is now.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object per case: its row and its state.")
 @store_option
 @debug_option
 def status(as_json: bool, store: Path) -> None:
-    """The matrix of problems and routes: the newest outcome of every case, stale where its code has changed since.
+    """Show the status of every case, problems by routes.
 
     \b
-    ok             measured                       timeout, out-of-memory   met a limit
-    skipped        not for this route, too dear   not-converged, non-finite, failed, crashed
-    pruned         a smaller size met a limit     (stale)  code, data or libraries have changed
-    -              not run                        (gone)   its problem or route is no longer there
+    ok                            measured
+    skipped                       not possible by this route, or above --budget
+    pruned                        not run: a smaller size met a limit
+    timeout, out-of-memory        met a limit
+    not-converged, non-finite,
+    failed, crashed               failed; `routes run` and `report` give reasons
+    -                             not run
+    (stale)                       code, data or libraries have changed since
+    (gone)                        its problem or route no longer exists
 
     `routes run ... --resume` runs what is missing, failed or stale.
     """

@@ -1,4 +1,4 @@
-"""The matrix of a store: problems down, routes across, what became of each."""
+"""The table of `routes status`: a row per problem, a column per route."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gradient_routes.bench.store.status import Standing, counts
 
 
 def matrix(standing: list[Standing]) -> TextTable:
-    """A line a problem with its settings, a column a route; several options of one route share a cell."""
+    """A row per problem and settings, a column per route; variants of one route share a cell."""
     cells: dict[str, dict[str, list[Standing]]] = {}
     for each in standing:
         cells.setdefault(asked(each.row), {}).setdefault(each.row["route"], []).append(each)

@@ -20,7 +20,7 @@ from gradient_routes.bench.execution.timing import seconds_of
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Fields, Offers, ParameterView, Problem
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import State
+from gradient_routes.routes.newton import Solver, State
 from gradient_routes.routes.route import Options, Result, Route
 from gradient_routes.routes.tally import Work
 
@@ -61,8 +61,8 @@ class CaseContext:
             check_columns(settings.columns, self.problem.name, self.n_p)
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
-        # references must not share the errors of the solver that the routes use
-        direct = replace(settings.solver, linear_solver="auto", newton="full")
+        # references are independent of the solver that is examined
+        direct = replace(settings.solver, linear_solver=Solver.linear_solver, newton=Solver.newton)
         self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_reference, found)
         self._forward_model = self.model()
         self._priced: tuple[Prices, State | None] | Exception | None = None

@@ -35,6 +35,7 @@ from gradient_routes.routes.route import Options, Result, Route
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
 SMALL = 1e-6  # relative residual of a state that counts as converged
 WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
+FLOAT64 = "compute in float64 (JAX: jax.config.update('jax_enable_x64', True), PyTorch: dtype=torch.float64)"
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
     begin("its first call")
     first_s, result = seconds_of(lambda: gradient(p))
     record.add({"first_s": first_s})
-    record.add(_checked(context, route, result))
+    record.add(_checked(context, route, result, record))
     begin("judgement")
     _judge(context, route, record, np.asarray(result.gradient))
     begin("the counting of its work")
@@ -226,10 +227,13 @@ def _note_whole(context: CaseContext, route: Route, options: Options, record: Re
         record.note(f"{route.name}: whole gradient: predicted {duration(seconds)} ({summary(work)})")
 
 
-def _checked(context: CaseContext, route: Route, result: Result) -> Row:
+def _checked(context: CaseContext, route: Route, result: Result, record: Record) -> Row:
     """The columns of J and the gradient. Raises Failure for what is no finite real gradient."""
     if np.iscomplexobj(result.gradient):
         raise Failure(f"{route.name}: gradient of complex numbers - return the real dJ/dp")
+    given = np.asarray(result.gradient).dtype
+    if given.kind == "f" and given.itemsize < 8:
+        record.note(f"{route.name}: gradient in {given}: {FLOAT64}")
     g = np.asarray(result.gradient, dtype=np.float64)
     if g.shape != context.p.shape:
         raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(context.p)} parameters - mend the route")

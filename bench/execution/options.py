@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
     Executing = Callable[[bool, Limits, bool], How]  # isolate, limits, timed
 
-STOPS = "Seconds of wall time, after which {} is stopped, and {:g} s later killed with all it started; inf: none."
-ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
-KILLS = "Seconds of wall time, after which {} is killed with all it started; inf: none."
-MEMORY = "Resident memory at which it is killed: 4GiB, 500MB. [what the machine has]"
-THREADS = "Threads of BLAS, PARDISO and XLA each."
-AFFINITY = "Processors to stay on: 0 or 0,2-3. [any]"
+STOPS = "Wall time [s] after which {} is stopped and, {:g} s later, killed with its child processes; inf: none."
+ISOLATE = "Run in a separate process; needed for --timeout and --memory."
+KILLS = "Wall time [s] after which {} is killed with its child processes; inf: none."
+MEMORY = "Resident memory at which it is killed, as 4GiB or 500MB. [all of the machine]"
+THREADS = "Number of threads of each of BLAS, PARDISO and XLA."
+AFFINITY = "Processors to run on, as 0 or 0,2-3. [any]"
 KINDS = ("local", "dask")
-EXECUTOR = "This machine, or a Dask cluster: one case at a time on each worker, on each host where they are timed."
-SCHEDULER = "Of the Dask cluster: tcp://HOST:8786. [a cluster of this machine]"
-WORKERS = "Of a Dask cluster of this machine. [one; with --no-timing one a processor]"
-JOBS = "Cases side by side; for --no-timing only, they are in each other's way."
+EXECUTOR = "Run on this machine or on a Dask cluster, one case at a time per worker (timed: per host)."
+SCHEDULER = "Address of the Dask scheduler, as tcp://HOST:8786. [a local cluster]"
+WORKERS = "Number of workers of a local Dask cluster. [1; with --no-timing one per processor]"
+JOBS = "Number of cases that run at the same time; more than 1 needs --no-timing."
 
 
 def limit_options(what: str, timeout: float, last_words: float = 0.0) -> Callable[[Command], Command]:

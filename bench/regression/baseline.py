@@ -1,6 +1,6 @@
-"""A baseline: what a store measured, as a small text file to commit, one line a case.
+"""A baseline: the measurements of a store as a small text file to commit, one line per case.
 
-No host, no date, three digits of what varies: measured again, few lines change.
+It has no host, no date and few digits, so that a repeated measurement changes few lines.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from gradient_routes.routes.tally import KINDS
 
 MARK = "gradient-routes baseline"
 VERSION = 1
-ROUNDS = 50  # ratios kept of a case: more tell ranks little and fill pages
+ROUNDS = 50  # ratios kept of a case: more hardly improve a rank test
 MAGIC = b"SQLite format 3\0"
 COLUMN = {column.name: column for column in COLUMNS}
 REQUIRED = ("problem", "route", "at", "status")
-REMEDY = "write it anew with `routes baseline`"
+REMEDY = "write it again with `routes baseline`"
 
 
 def measured(path: Path) -> Measured:
@@ -59,7 +59,7 @@ def as_text(found: Measured) -> str:
 
 
 def _order(of: Case | Verdict) -> tuple[str, ...]:
-    """Another order than that of measuring: lines stay where they are."""
+    """A key to sort by that does not depend on the order of measuring."""
     return (of.name, of.key) if isinstance(of, Case) else of.key
 
 
@@ -68,14 +68,14 @@ def _json(value: Any) -> str:
 
 
 def _compact(case: Case) -> Row:
-    """What is absent is left out, and so are work that was not done and the bill of what was run."""
+    """The row without absent values, counts of 0 and the predicted cost of what was run."""
     row = {name: value for name, value in case.row.items() if value is not None and name != "reason"}
     row |= {name: _digits(row[name], 3) for name in ("gradient_error", "seconds") if name in row}
     if case.ok:
         row.pop("predicted_s", None)
     if "work" in row:
         row["work"] = {kind: count for kind, count in row["work"].items() if count}
-    every = max(1, -(-len(case.ratios) // ROUNDS))  # from beginning to end, so that a drift remains one
+    every = max(1, -(-len(case.ratios) // ROUNDS))  # evenly from all rounds, so that a drift is kept
     row["ratios"] = [_digits(ratio, 4) for ratio in case.ratios[::every]]
     row["fastest"] = None if case.fastest is None else _digits(case.fastest, 4)
     return row | {"environment": fingerprint(case.environment)}
@@ -86,7 +86,7 @@ def _digits(value: float, digits: int) -> float:
 
 
 def write(path: Path, found: Measured) -> None:
-    """Raises InputError rather than replace what is no baseline."""
+    """Write a baseline. Raises InputError rather than overwrite a file that is not one."""
     try:
         if path.exists() and path.stat().st_size and MARK not in path.read_text(errors="replace")[:100]:
             raise InputError(f"{path}: is there and no baseline - name another file with -o")
@@ -96,7 +96,7 @@ def write(path: Path, found: Measured) -> None:
 
 
 def read(path: Path, content: bytes) -> Measured:
-    """What `as_text` wrote. Raises InputError for a file of another kind, a broken or a newer one."""
+    """Read what `as_text` wrote. Raises InputError for another kind of file, a broken or a newer one."""
     try:
         given = json.loads(content)
     except (UnicodeDecodeError, RecursionError) as error:
@@ -146,13 +146,13 @@ def _verdict(entry: Mapping[str, Any]) -> Verdict:
 
 
 def _value(column: Column, value: Any) -> Any:
-    """Of the column's type, or absent. Raises TypeError, ValueError, OverflowError."""
+    """The value in the type of the column, or None. Raises TypeError, ValueError, OverflowError."""
     if value is None:
         return None
     if column.json:
         return dict(value)
     if column.type != "TEXT":
-        number = float(value)  # also of an integer that is none a float can hold: refused
+        number = float(value)  # raises for integers beyond the range of a float
         return int(value) if column.type == "INTEGER" else number
     if not isinstance(value, str):
         raise TypeError(f"{value!r} is no text")

@@ -1,4 +1,4 @@
-"""The comparison: cases that are the same question paired, every rule asked, what differs between machines said."""
+"""The comparison: pairs of cases, the findings of every rule, notes on libraries that differ."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RULES: tuple[Rule, ...] = (rules.work, rules.gradient_error, rules.peak_bytes, *
 
 @dataclass(frozen=True)
 class Comparison:
-    """All findings, case by case; `notes` say what held of many."""
+    """Findings case by case, and notes on the whole."""
 
     base: str
     new: str
@@ -40,12 +40,12 @@ class Comparison:
 
     @property
     def by_numbers(self) -> int:
-        """Cases whose numbers are compared: they are ok on both sides."""
+        """Number of cases that are ok on both sides, so that numbers are compared."""
         return sum(f.metric == "status" and f.base == f.new == "ok" for f in self.findings)
 
     @property
     def by_status(self) -> int:
-        """Cases of both of which no more than how they ended is compared."""
+        """Number of other cases of both sides, of which only the status is compared."""
         return sum(f.metric == "status" for f in self.findings) - self.by_numbers
 
     @property
@@ -60,7 +60,7 @@ def compare(
     factor: float = FACTOR,
     subset: bool = False,
 ) -> Comparison:
-    """Every rule on every case of both; what only BASE has is worse unless `subset`.
+    """Apply every rule to every case of both sides; a case that only BASE has is worse unless `subset`.
 
     Raises InputError where nothing can be compared.
     """
@@ -82,7 +82,7 @@ def compare(
 
 
 def _check_measured(base: Measured, new: Measured, pairs: Sequence[Pair], findings: Sequence[Finding]) -> None:
-    """Raises InputError where pairs tell nothing in numbers, unless a case that was run and fails is a regression."""
+    """Raise InputError where no numbers are compared, unless a case that was run is a regression."""
     ran = any(n.row["status"] not in UNMEASURED for _, n in pairs)
     if not pairs or any(b.ok and n.ok for b, n in pairs) or (ran and _any_worse(findings)):
         return
@@ -98,7 +98,7 @@ def _counted(statuses: Counter[str]) -> str:
 
 
 def paired(base: Sequence[Case], new: Sequence[Case]) -> tuple[list[Pair], list[Case], list[Case]]:
-    """Cases of the same key, then of the same name where a row of an older version has no key; and those left over."""
+    """Pairs of the same key or, for rows of older versions, of the same name; and the cases left over on each side."""
     pairs, left, over = _paired(base, new, "key")
     more, left, over = _paired(left, over, "name", keyed=False)
     return pairs + more, left, over
@@ -121,7 +121,7 @@ def _paired(
 def of_case(
     base: Case, new: Case, expectations: Sequence[Expectation], time: TimeRule, subset: bool = False
 ) -> Iterator[Finding]:
-    """What there is to say of one case: how it ended, and where it was measured in both the numbers."""
+    """The findings of one case: its status and, where both are ok, its numbers."""
     ended, expected = rules.status(base, new, subset), judged(new.row, expectations)
     if expected is not None:
         ended = Finding(ended.case, ended.metric, ended.base, ended.new, "shown", f"{ended.new}, {expected.says}")
@@ -146,14 +146,14 @@ def _any_worse(findings: Sequence[Finding]) -> bool:
 
 
 def _libraries(pairs: Sequence[Pair]) -> Iterator[str]:
-    """Each difference once, with how many cases it is about; numbers are compared all the same."""
+    """Each difference once, with the number of cases; numbers are compared in any case."""
     found = [tuple(library_differences(base, new)) for base, new in pairs]
     for one in dict.fromkeys(filter(None, found)):
         yield f"libraries differ in {found.count(one)} of {len(pairs)} cases: {'; '.join(one)}"
 
 
 def _idle(new: Measured, expectations: Sequence[Expectation]) -> Iterator[str]:
-    """An expectation of a case that is not there may be mistyped."""
+    """Expectations that name no case: they may be mistyped."""
     for e in expectations:
         if not any(e.matches(case.row) for case in new.cases):
             yield f"expected {e.status} of {e.route} on {e.problem}: no such case in {new.source}"

@@ -1,4 +1,4 @@
-"""A finding: one metric of one case before and now, and how that is judged."""
+"""A finding: a metric of a case before and now, and whether it is worse."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ JUDGEMENTS: tuple[Judgement, ...] = ("worse", "better", "shown", "not-compared",
 
 @dataclass(frozen=True)
 class Finding:
-    """`case` names the problem and the route; `base` and `new` are values of the metric, None where there is none."""
+    """`case` names problem and route; `base` and `new` are the values of the metric, None if absent; `says` is a
+    sentence about them."""
 
     case: Row
     metric: str

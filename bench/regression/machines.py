@@ -1,4 +1,4 @@
-"""Where two cases were measured: another machine forbids to compare time, another library is said."""
+"""Differences of the machines and libraries of two cases: times of different machines are not compared."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ LIBRARIES = ("python", "blas")
 
 
 def machine_differences(base: Case, new: Case) -> list[str]:
-    """What of the machine, or of its threads, is another: `cores 2 there, 8 here`."""
+    """Differences of machine and threads: `cores 2 there, 8 here`."""
     pairs = {name: (base.environment.get(name), new.environment.get(name)) for name in MACHINE}
     pairs["threads of the case"] = (base.row["threads"], new.row["threads"])
     return _differences(pairs)
 
 
 def library_differences(base: Case, new: Case) -> list[str]:
-    """Which versions are others."""
+    """Differences of versions."""
     pairs = {name: (base.environment.get(name), new.environment.get(name)) for name in LIBRARIES}
     before, now = (case.environment.get("versions") or {} for case in (base, new))
     pairs |= {name: (before.get(name), now.get(name)) for name in sorted(before.keys() | now.keys())}

@@ -1,4 +1,4 @@
-"""What is compared: the latest row of every case, its rounds as ratios to a forward solve, the latest verdicts."""
+"""One side of a comparison: the latest row of every case, times relative to a forward solve, the latest verdicts."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ KEPT = ("case_key", *NAMES, "settings", "status", "reason", *NUMBERS, *HOW)
 
 @dataclass(frozen=True)
 class Case:
-    """The columns KEPT of a row, where it was measured, and its time.
+    """The columns KEPT of a row, its environment and its times.
 
-    ratios   seconds of the gradient / of a forward solve, round by round
-    fastest  the same of the fastest of each, whose rounds may differ
+    ratios   seconds of the gradient / seconds of a forward solve, round by round
+    fastest  the least seconds of a gradient / the least of a forward solve
     """
 
     row: Row
@@ -34,12 +34,12 @@ class Case:
 
     @property
     def name(self) -> str:
-        """The same for the same problem and route with the same options, as far as the row tells."""
+        """Problem, route, their options and p: what identifies a case of an older version."""
         return json.dumps([self.row[name] for name in NAMES], sort_keys=True)
 
     @property
     def key(self) -> str:
-        """The key of what was asked; rows of older versions have none."""
+        """The key of problem, route and settings, or `name` for rows of older versions."""
         return self.row["case_key"] or self.name
 
     @property
@@ -49,7 +49,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a check said of a route, or of other people's code, at p."""
+    """The verdict of a check on a route, or on foreign code, at p."""
 
     problem: str
     route: str | None
@@ -62,13 +62,13 @@ class Verdict:
 
     @property
     def case(self) -> Row:
-        """As findings name it; the selectors hold the options."""
+        """As `Finding.case`; problem and route are selectors with their options."""
         return {"problem": self.problem, "route": self.route or "", "at": self.at}
 
 
 @dataclass(frozen=True)
 class Measured:
-    """All that one side of a comparison holds; `source` names it."""
+    """Cases and verdicts of a store or a baseline, which `source` names."""
 
     source: str
     cases: tuple[Case, ...]
@@ -76,7 +76,7 @@ class Measured:
 
 
 def of_store(store: Store) -> Measured:
-    """The latest of everything in a store. Raises InputError where it holds neither a case nor a verdict."""
+    """The latest cases and verdicts of a store. Raises InputError where there are none."""
     cases, verdicts = _cases(store), _verdicts(store)
     if not cases and not verdicts:
         raise InputError(f"store {store.path}: holds no case and no verdict - run `routes run` first, or name another")
@@ -101,7 +101,7 @@ def _environments(store: Store) -> Mapping[str, Environment]:
 
 
 def _times(store: Store, of: set[int]) -> dict[int, tuple[tuple[float, ...], float]]:
-    """By case_id, ratios and that of the fastest; gradient and forward solve of one round are neighbours in time."""
+    """Ratios and `fastest` by case_id; the gradient and the forward solve of one round are measured in succession."""
     seconds: defaultdict[int, dict[str, dict[int, float]]] = defaultdict(lambda: {"gradient": {}, "forward": {}})
     names, records = store.table("samples")
     case, kind, of_round, value = (names.index(name) for name in ("case_id", "kind", "round", "seconds"))

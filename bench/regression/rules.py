@@ -1,4 +1,4 @@
-"""One rule a metric, but for time: when is it worse than before, and why."""
+"""A rule for each metric except time: when it is worse than before."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gradient_routes.bench.regression.measured import Case, Verdict
 from gradient_routes.bench.render.format import bytes_, number
 from gradient_routes.routes.tally import KINDS
 
-ROUNDING = 1e-13  # errors below are all the same: sums of another order end there
+ROUNDING = 1e-13  # errors below count as equal: the order of sums changes them
 DECADE = 1.0
-MEMORY, FLOOR = 1.25, 5 * 2**20  # pages of allocators and interpreters come and go: percent of little are nothing
-HELD = 1.1  # arrays are counted, but padded and ordered as the library likes
+MEMORY, FLOOR = 1.25, 5 * 2**20  # factor and bytes: small peaks vary by more than the factor
+HELD = 1.1  # arrays are counted exactly, but libraries pad and order them differently
 
 
 def status(base: Case, new: Case, subset: bool = False) -> Finding:
-    """A case that was answered and fails is worse, and so is one that was ok and is not run any more.
+    """A case that was answered and fails is worse, and so is one that was ok and is no longer run.
 
-    Under another budget `subset` allows the latter: it is then the budget that may have changed, and not the bill.
+    The latter is allowed by `subset` under another budget, which may be the reason.
     """
     before, now = base.row["status"], new.row["status"]
     reason = f": {new.row['reason']}" if new.row["reason"] else ""
@@ -42,14 +42,14 @@ def _ended(base: Case, new: Case, subset: bool) -> Judgement:
 
 
 def _may_be_the_budget(base: Case, new: Case) -> bool:
-    """Not where a route no longer runs on the problem, which has no bill; a baseline may not tell its budget."""
+    """Whether another budget may be why a case is not run: not if the route does not run on the problem at all."""
     before, now = base.row["budget_s"], new.row["budget_s"]
     lost = new.row["status"] == "skipped" and new.row["predicted_s"] is None
     return before is not None and before != now and not lost
 
 
 def work(base: Case, new: Case) -> Finding:
-    """Counts are exact: more of any kind is worse, less is better."""
+    """A larger count of any kind is worse, a smaller one better."""
     before, now = base.row["work"], new.row["work"]
     if before is None or now is None:
         return _absent("work", base, new, _counts(before), _counts(now))
@@ -58,7 +58,7 @@ def work(base: Case, new: Case) -> Finding:
 
 
 def counted(before: Mapping[str, int], now: Mapping[str, int]) -> tuple[Judgement, str]:
-    """Which counts are others, by name; a kind that is left out was counted 0 times."""
+    """Compare counts by kind; a kind that is absent was counted 0 times."""
     pairs = {kind: (before.get(kind, 0), now.get(kind, 0)) for kind in KINDS}
     changed = {kind: (b, n) for kind, (b, n) in pairs.items() if b != n}
     more = any(b < n for b, n in changed.values())
@@ -71,7 +71,7 @@ def _counts(work: dict[str, int] | None) -> dict[str, int] | None:
 
 
 def gradient_error(base: Case, new: Case) -> Finding:
-    """By order of magnitude, from rounding on; an error that is no longer known is worse."""
+    """Worse by an order of magnitude above ROUNDING, or no longer known."""
     before, now = (_finite(case.row["gradient_error"]) for case in (base, new))
     if before is None or now is None:
         return _absent("gradient_error", base, new, before, now)
@@ -88,11 +88,11 @@ def _finite(value: float | None) -> float | None:
 
 
 def peak_bytes(base: Case, new: Case) -> Finding:
-    """Measured: worse by percent and by an absolute floor; only what was measured in the same way compares."""
+    """Worse by MEMORY and by FLOOR; compared only if measured by the same method."""
     before, now = base.row["peak_bytes"], new.row["peak_bytes"]
     for name, how in (("memory_method", "measured by"), ("isolated", "with isolated =")):
         a, b = base.row[name], new.row[name]
-        if a != b and (now is not None or name == "isolated"):  # what is not measured has no method
+        if a != b and (now is not None or name == "isolated"):  # without a measurement there is no method
             return _uncompared("peak_bytes", new, before, now, f"memory, {how} {a} there, {b} here")
     if before is None or now is None:
         return _absent("peak_bytes", base, new, before, now)
@@ -105,7 +105,7 @@ def peak_bytes(base: Case, new: Case) -> Finding:
 
 
 def held(metric: str, base: Case, new: Case) -> Finding:
-    """Counted bytes of arrays, a tape's or factors': worse beyond HELD, and where they are no longer counted."""
+    """Bytes of a tape or of factors: worse by HELD, or no longer counted."""
     before, now = base.row[metric], new.row[metric]
     if now is None and before is not None and base.row["route_options"] != new.row["route_options"]:
         return _uncompared(metric, new, before, now, f"{metric}, the route has other options")
@@ -123,19 +123,19 @@ def _grown(what: str, before: float, now: float, judgement: Judgement) -> str:
 
 
 def verdict(base: Verdict, new: Verdict) -> Finding:
-    """Exact, in both directions: a judge that no longer sees a fault is as bad as a fault."""
+    """Any change is worse: a check that no longer finds a fault is as bad as a fault."""
     same = base.verdict == new.verdict
     says = "" if same else f"{base.verdict} -> {new.verdict}"
     return Finding(new.case, "verdict", base.verdict, new.verdict, "same" if same else "worse", says)
 
 
 def seconds(base: Case, new: Case) -> Finding:
-    """Shown, never judged: another load, another clock rate, another number."""
+    """Shown only: seconds vary with load and clock rate."""
     return Finding(new.row, "seconds", base.row["seconds"], new.row["seconds"], "shown")
 
 
 def _absent(metric: str, base: Case, new: Case, before: Any, now: Any) -> Finding:
-    """A number that one side lacks: lost is worse, found is shown."""
+    """A number that one side lacks: worse if NEW lacks it."""
     if before is None and now is None:
         return Finding(new.row, metric, before, now, "same")
     lost = now is None
@@ -148,7 +148,7 @@ def _uncompared(metric: str, case: Case, before: Any, now: Any, why: str) -> Fin
 
 
 def gone(case: Row, what: str, allowed: bool) -> Finding:
-    """What is in BASE and not in NEW: a gate must not pass by measuring nothing."""
+    """A case of BASE that NEW lacks: worse, or else a gate would pass without measuring."""
     return Finding(case, "case", what, None, "shown" if allowed else "worse", f"{what} -> not measured")
 
 

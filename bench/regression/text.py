@@ -1,4 +1,4 @@
-"""A comparison as text for others: Markdown for a pull request, JSON for programs."""
+"""A comparison as Markdown, for a pull request, and as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SIGNS = {"worse": "❌", "better": "✅", "shown": "•", "not-compared": "◌"}
 
 
 def markdown(comparison: Comparison) -> str:
-    """A heading that says it all, what is to be said below, and every case folded away."""
+    """The conclusion as a heading, a list of findings, and a folded table of all cases."""
     written = [f"### Gradient routes: {_safe(conclusion(comparison))}", ""]
     written += [f"- {SIGNS.get(judgement, '')} {_safe(line)}" for judgement, line in lines(comparison)]
     written += [f"- note: {_safe(note)}" for note in comparison.notes]
@@ -39,13 +39,13 @@ def _row(problem: str, route: str, by_metric: dict[str, Finding]) -> str:
 
 
 def _safe(text: str) -> str:
-    """What Markdown or HTML would take for its own is escaped; one line."""
+    """One line with the characters of Markdown and HTML escaped."""
     escaped = plain(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;").replace(" -> ", " → ")
     return "".join(f"\\{c}" if c in "|*_`[]" else c for c in escaped)
 
 
 def as_json(comparison: Comparison) -> str:
-    """One object; its findings one a metric of a case."""
+    """One JSON object with a finding per metric and case."""
     content = {
         "base": comparison.base,
         "new": comparison.new,

@@ -1,4 +1,4 @@
-"""The rule of time: ratios to a forward solve of the same round, by ranks and by a factor."""
+"""The rule for time: ratios to a forward solve of the same round, compared by ranks and by a factor."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from gradient_routes.bench.regression.machines import machine_differences
 from gradient_routes.bench.regression.measured import Case
 from gradient_routes.bench.render.format import number, ratio
 
-FALSE_ALARM = 0.01  # chance that ranks alone err anywhere in a comparison of cases that are all as before
-FACTOR = 1.25  # processes differ by what ranks call certain: where arrays lie, who else is on the machine
-ROUNDS = 15  # fewer lie within one burst of a neighbour's load, and are then no independent samples
+FALSE_ALARM = 0.01  # probability of any false alarm by ranks in a comparison without changes
+FACTOR = 1.25  # two processes differ significantly for reasons of their own: memory layout, load of the machine
+ROUNDS = 15  # fewer may all lie in one burst of other load and are not independent
 
 
 @dataclass(frozen=True)
 class TimeRule:
-    """Slower where ranks of raw rounds say so at the level `p`, and medians and fastest rounds by more than `factor`.
+    """Slower if a rank test of all rounds says so at level `p`, and median and fastest round both differ by `factor`.
 
-    `p` is FALSE_ALARM over the number of cases compared (Bonferroni), so that many cases raise no more false alarms
-    than one. The fastest decide, too, since noise only adds: a long call waits for its core where a short one does not,
-    which moves every rank. Of 292 pairs of equal cases on two cores with a load of 4 to 8 none was called slower;
-    twice as slow, 267 were.
+    `p` is FALSE_ALARM over the number of cases (Bonferroni). The fastest round is used as well because load of the
+    machine only adds time, and more to long calls than to short ones. Of 292 pairs of equal cases on two cores at a
+    load of 4 to 8 none was called slower; of those made twice as slow, 267 were.
     """
 
     factor: float = FACTOR
@@ -76,12 +75,12 @@ class TimeRule:
 
 
 def greater(these: Sequence[float], those: Sequence[float]) -> float:
-    """p of `these` ranking as high over `those` as they do, were they alike (Mann & Whitney 1947)."""
+    """p-value of `these` being greater than `those` (Mann & Whitney 1947)."""
     from scipy.stats import mannwhitneyu
 
     return float(mannwhitneyu(these, those, alternative="greater").pvalue)
 
 
 def least_p(n: int, m: int) -> float:
-    """What complete separation of n and m values gives: no test by ranks can say less."""
+    """The least p-value of a rank test of n and m values: they are completely separated."""
     return 1 / comb(n + m, n)

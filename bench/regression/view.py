@@ -1,4 +1,4 @@
-"""A comparison for a person: every case before and now, then what is worse, better or not compared, in sentences."""
+"""A comparison in a terminal: a table of all cases, then findings in sentences."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.regression.compare import Comparison
 from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding, Judgement
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
-from gradient_routes.bench.render.terminal.tables import RESOLUTION, named, show, titled
+from gradient_routes.bench.render.terminal.tables import RESOLUTION, named, say, show, titled
 from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.routes.tally import Work
 
@@ -35,17 +35,16 @@ FEW = 3  # cases that a line names
 
 
 def show_comparison(out: Console, comparison: Comparison) -> None:
-    """The table of cases, then the sentences, the conclusion last."""
+    """Print the table, the sentences and, last, the conclusion."""
     cases = overview(comparison)
     if cases:
         show(out, _table(cases))
-        out.print(Text(LEGEND, style="dim"), soft_wrap=True)
+        say(out, LEGEND, "dim")
     for judgement, line in lines(comparison):
-        out.print(Text(line, style=STYLES.get(judgement, "")), soft_wrap=True)
+        say(out, line, STYLES.get(judgement, ""))
     for note in comparison.notes:
-        out.print(Text(f"note: {note}", style="italic"), soft_wrap=True)
-    style = "bold red" if comparison.worse else "bold green"
-    out.print(Text(conclusion(comparison), style=style), soft_wrap=True)
+        say(out, f"note: {note}", "italic")
+    say(out, conclusion(comparison), "bold red" if comparison.worse else "bold green")
 
 
 def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> TextTable:
@@ -60,7 +59,7 @@ def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> TextTable:
 
 
 def overview(comparison: Comparison) -> list[tuple[str, str, dict[str, Finding]]]:
-    """Problem, route and findings by metric of every case of both."""
+    """Problem, route and findings by metric of every case of both sides."""
     grouped: defaultdict[int, dict[str, Finding]] = defaultdict(dict)
     for finding in comparison.findings:
         if finding.metric in METRICS:
@@ -70,14 +69,14 @@ def overview(comparison: Comparison) -> list[tuple[str, str, dict[str, Finding]]
 
 
 def names(case: Row) -> tuple[str, str]:
-    """Problem and route as selectors; those of a verdict are already."""
+    """Problem and route as selectors, which those of a verdict already are."""
     if "problem_options" not in case:
         return case["problem"], case["route"]
     return titled(case), named("route", case)
 
 
 def cell(finding: Finding | None, metric: str) -> tuple[str, str]:
-    """`before -> now`, or once what is the same, and its style."""
+    """`before -> now`, or one value if they are equal, and its style."""
     if finding is None:
         return "", ""
     before, now = (_value(metric, value) for value in (finding.base, finding.new))
@@ -98,7 +97,7 @@ def _value(metric: str, value: Any) -> str:
 
 
 def lines(comparison: Comparison) -> Iterator[tuple[Judgement, str]]:
-    """A sentence a finding, the worse ones first; cases of which the same is to be said share one."""
+    """A sentence per finding, the worse ones first; cases with the same sentence share it."""
     for judgement in JUDGEMENTS:
         shared: defaultdict[str, list[Finding]] = defaultdict(list)
         for finding in comparison.findings:
@@ -116,7 +115,7 @@ def _whose(findings: Sequence[Finding]) -> str:
 
 
 def conclusion(comparison: Comparison) -> str:
-    """How many cases are compared and by what, findings of each kind, and whether they make a regression."""
+    """Whether there is a regression, the number of cases compared, and the number of findings of each kind."""
     verdicts = sum(finding.metric == "verdict" for finding in comparison.findings)
     compared = [_cases(comparison)] if comparison.by_numbers or comparison.by_status else []
     compared += [f"{verdicts} verdict{'s' if verdicts > 1 else ''}"] if verdicts else []

@@ -13,15 +13,20 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment, environment, fingerprint
 from gradient_routes.bench.cases.row import ENVIRONMENTS, STORED, as_record, from_record, stored
 from gradient_routes.bench.cases.samples import Samples
+from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.bench.store.schema import KEY, tables
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
 SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: scaling, inversion, identifiability
@@ -29,7 +34,16 @@ PATIENCE = 60.0  # [s] to wait for another writer
 
 
 class Store:
-    """A store on disk. `append` keeps a row, `table` gives one back. Every call opens the file and closes it."""
+    """What `routes` keeps: an SQLite file, `results/routes.sqlite` unless told otherwise.
+
+    Every call opens the file and closes it. Tables and columns: results/README.md.
+
+    >>> frame = run("bar", ["adjoint", "fd-central"], timing=False, store="routes.sqlite")
+    >>> Store("routes.sqlite").cases()[["case_id", "problem", "route", "status", "work_forward_solves"]]
+       case_id problem       route status  work_forward_solves
+    0        1     bar     adjoint     ok                    1
+    1        2     bar  fd-central     ok                   16
+    """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -119,6 +133,27 @@ class Store:
                         f"store {self.path}: {where}: no JSON ({error}) - delete that row, or name another store"
                     ) from error
         return row
+
+    def cases(self) -> DataFrame:
+        """All cases of `routes run`, oldest first: one row each. An absent value is NA, objects are JSON text.
+
+        Raises InputError where there is no store, or pandas is not installed.
+        """
+        return self._frame("cases")
+
+    def studies(self, table: str = "studies") -> DataFrame:
+        """All studies, oldest first, one row each; or the rows of one of their tables ("checks", "points" ...), which
+        belong to the study `study_id`. Raises InputError as `cases` does, and for a table that there is not.
+        """
+        known = ["studies", *registry.study_tables()]
+        if table not in known:
+            raise InputError(f"store: no table '{table}' of studies - {did_you_mean(table, known)}")
+        return self._frame(table)
+
+    def _frame(self, table: str) -> DataFrame:
+        from gradient_routes.bench.store.frames import frame
+
+        return frame(tables()[table], *self.table(table))
 
     def rows(self) -> list[Row]:
         """The cases as rows again."""

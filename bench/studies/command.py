@@ -12,11 +12,12 @@ import click
 
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import debug_option, refuse_given, store_options
-from gradient_routes.bench.execution.limited import LAST
 from gradient_routes.bench.execution.options import limit_options
 
 if TYPE_CHECKING:
-    pass
+    from gradient_routes.bench.execution.isolation.limits import Limits
+
+LAST = 10.0  # [s] to keep what there is when the time is over
 
 no_plot_option = click.option("--no-plot", is_flag=True, help="Only the tables.")
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object a row and nothing else.")
@@ -42,20 +43,33 @@ def command_of(study: Study) -> click.Command:
     return click.command(study.name, help=f"{study.question}\n\n{cleandoc(study.help)}")(callback)
 
 
-def _call(study: Study, /, *, as_json: bool, kept: Path | None, no_plot: bool = False, **options: Any) -> None:
+def _call(
+    study: Study,
+    /,
+    *,
+    as_json: bool,
+    kept: Path | None,
+    no_plot: bool = False,
+    isolate: bool,
+    limits: Limits,
+    **given: Any,
+) -> None:
+    from gradient_routes.bench.execution.isolation.run import here, stream
     from gradient_routes.bench.studies.job import RunStudy, Screen
     from gradient_routes.bench.studies.session import Session
 
     for rule in study.rules:
-        if not rule.when(options):
+        if not rule.when(given):
             refuse_given(rule.names, rule.why)
+    if not study.confined:  # it runs cases that are
+        given |= {"isolate": isolate, "limits": limits}
+    job = RunStudy(study.name, given | {"kept": kept}, Screen.of(sys.stdout), as_json, not no_plot)
     session = Session(study, kept, as_json)
-    _, limits = (options.pop(name) for name in ("isolate", "limits")) if study.confined else (False, None)
-    job = RunStudy(study.name, options | {"kept": kept}, Screen.of(sys.stdout), as_json, not no_plot)
-    if limits is not None:
-        limits.pin()
-    try:
-        code = job.run(session.hear)
-    finally:
-        session.keep()
-    raise click.exceptions.Exit(code)
+    if study.confined and isolate:
+        for message in stream(job, limits, last_words=LAST if study.keeps else 0.0):
+            session.hear(message)
+    else:
+        if not isolate:
+            limits.pin()
+        here(job, session.hear)
+    raise click.exceptions.Exit(session.close())

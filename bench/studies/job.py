@@ -9,7 +9,8 @@ from typing import IO, cast
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.row import clean
-from gradient_routes.bench.cases.study import Found, Kept, Message, Note, Options
+from gradient_routes.bench.cases.study import Found, Message, Options
+from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.render.terminal.tables import PIPED_WIDTH
 from gradient_routes.bench.render.terminal.terminal import Terminal
 
@@ -21,8 +22,11 @@ class Printed:
     text: str
 
 
-Heard = Kept | Note | Printed
-Hear = Callable[[Heard], None]
+@dataclass(frozen=True)
+class ExitCode:
+    """Of a study that came to its end."""
+
+    code: int
 
 
 @dataclass(frozen=True)
@@ -38,10 +42,10 @@ class Screen:
         here = Terminal(file=stream)
         return cls(here.is_terminal, here.width if here.is_terminal else PIPED_WIDTH, here.color_system)
 
-    def console(self, hear: Hear) -> Terminal:
+    def console(self, say: Callable[[Printed], None]) -> Terminal:
         """A console whose text is heard as Printed."""
         return Terminal(
-            file=cast(IO[str], Speaker(hear)),
+            file=cast(IO[str], Speaker(say)),
             width=self.width,
             force_terminal=self.terminal,
             color_system=self.colors,  # type: ignore[arg-type]  # rich's own name for it
@@ -54,11 +58,11 @@ class Screen:
 class Speaker:
     """A text stream that says what is written to it."""
 
-    def __init__(self, hear: Hear) -> None:
-        self._hear = hear
+    def __init__(self, say: Callable[[Printed], None]) -> None:
+        self._say = say
 
     def write(self, text: str) -> int:
-        self._hear(Printed(text))
+        self._say(Printed(text))
         return len(text)
 
     def flush(self) -> None:
@@ -75,20 +79,20 @@ class RunStudy:
     as_json: bool
     plots: bool
 
-    def run(self, hear: Hear) -> int:
-        """Its exit code. Raises what the study raises."""
+    def __call__(self, channel: Channel) -> None:
+        """Says rows and notes, what the view prints, and the exit code. Raises what the study raises."""
         study = registry.studies()[self.name]
         run, view, as_dict = (study.load(part) for part in ("run", "view", "json"))
         assert run is not None
-        out = self.screen.console(hear)
+        out = self.screen.console(channel.say)
 
         def say(message: Message) -> None:
             if not isinstance(message, Found):
-                hear(message)
+                channel.say(message)
             elif self.as_json:
                 if as_dict is not None:
-                    hear(Printed(json.dumps(clean(as_dict(message.value)), allow_nan=False) + "\n"))
+                    channel.say(Printed(json.dumps(clean(as_dict(message.value)), allow_nan=False) + "\n"))
             elif view is not None:
                 view(out, message.value, self.plots)
 
-        return run(say, **self.options) or 0
+        channel.say(ExitCode(run(say, **self.options) or 0))

@@ -53,13 +53,14 @@ def routes_of(selectors: Sequence[str], say: Say) -> list[RouteSpec]:
     return specs
 
 
-def built(spec: ProblemSpec, at: str) -> tuple[Problem, Array]:
-    """The problem and the point p. Raises InputError for a factory that fails in its own way."""
+def problem_at(selector: str, at: str = "start") -> tuple[Problem, Array]:
+    """The only problem that a selector names, and the point p. Raises InputError, whatever its factory raises."""
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
     from gradient_routes.bench.verification.guarded import FOREIGN
     from gradient_routes.problems.errors import RoutesError
 
+    spec = one_problem(selector)
     try:
         with stdout_to_stderr():
             problem = spec()

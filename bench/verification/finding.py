@@ -1,4 +1,4 @@
-"""A piece of evidence: a number, what it should be below, and what it says."""
+"""A piece of evidence beside difference quotients: a measured number and its limit."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """name of the test; value measured, NaN where it could not be; limit it should not pass.
+    """A test by name; value and limit are relative errors unless the name says otherwise, value NaN where unknown.
 
-    Both are relative errors where nothing else is said.
-    says     in words, where there is something to say
-    claim    a yes or no: value is 0 where it holds, else 1
-    culprit  the factor it convicts, where it does; by_mesh: unless that shrinks with the mesh size
+    says     explanation, where one is needed
+    culprit  the part of the gradient that the test proves wrong; by_mesh: unless the error shrinks with the mesh size
+    claim    a yes-or-no test: value is 0 where it holds, else 1
     """
 
     name: str
@@ -26,5 +25,5 @@ class Finding:
 
     @property
     def sound(self) -> bool | None:
-        """None where the value could not be had."""
+        """Whether the value is within its limit; None where it is unknown."""
         return None if math.isnan(self.value) else self.value <= self.limit

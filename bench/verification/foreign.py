@@ -1,4 +1,4 @@
-"""Other people's code as the subject of a check: functions, or an object that has them."""
+"""User code as the subject of a check: functions, or an object that has them."""
 
 from __future__ import annotations
 
@@ -9,45 +9,32 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.verification.guarded import FOREIGN
-from gradient_routes.bench.verification.subject import Subject, natural_scale, vector
+from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, default_label
 
 Bounds = tuple[Any, Any]
+OPTIONAL = ("scale", "bounds", "names", "tighten", "active_set")
 
 
 def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
-    """A subject out of an object with objective(p) and gradient(p), or value_and_gradient(p), and start (n_p,).
+    """A subject from an object with objective(p) and gradient(p), or value_and_gradient(p), and start (n_p,).
 
-    Optional: scale, bounds (lower, upper), names, tighten(factor), active_set(p). `start` overrides the object's.
-    A class, or a function that makes the object, is called first. Raises InputError for what is missing.
+    Optional attributes: scale, bounds (lower, upper), names, tighten(factor), active_set(p). `start` overrides the
+    object's. A class, or a function that returns the object, is called first. Raises InputError.
     """
     try:
-        return _subject_of(_made(thing, name), name, start)
+        made = _made(thing, name)
+        objective, gradient = functions_of(made, name)
+        given = getattr(made, "start", None) if start is None else start
+        optional = {keyword: getattr(made, keyword, None) for keyword in OPTIONAL}
+        if given is not None:
+            return subject(objective, gradient, given, name=name, **optional)
     except InputError:
         raise
-    except FOREIGN as failure:  # attributes may be properties, somebody else's code
-        raise InputError(
-            f"check: {name} cannot be looked at: {type(failure).__name__}: {failure} - mend it"
-        ) from failure
-
-
-def _subject_of(thing: Any, name: str, start: Any) -> Subject:
-    objective, gradient = functions_of(thing, name)
-    given = getattr(thing, "start", None) if start is None else start
-    if given is None:
-        raise InputError(f"check: {name} has no start - give it one, an array (n_p,), or a point with --at FILE.csv")
-    return subject(
-        objective,
-        gradient,
-        given,
-        name=name,
-        scale=getattr(thing, "scale", None),
-        bounds=getattr(thing, "bounds", None),
-        names=getattr(thing, "names", None),
-        tighten=getattr(thing, "tighten", None),
-        active_set=getattr(thing, "active_set", None),
-    )
+    except FOREIGN as failure:  # attributes may be properties, which run user code
+        raise InputError(f"check: {name} cannot be read: {type(failure).__name__}: {failure} - correct it") from failure
+    raise InputError(f"check: {name} has no start - give it one, an array (n_p,), or a point with --at FILE.csv")
 
 
 def functions_of(thing: Any, name: str) -> tuple[Callable[[Array], Any], Callable[[Array], Any]]:
@@ -78,29 +65,20 @@ def subject(
     tighten: Callable[[float], Any] | None = None,
     active_set: Callable[[Array], Any] | None = None,
 ) -> Subject:
-    """A subject out of plain functions. Raises InputError.
+    """A subject from plain functions. Raises InputError.
 
-    tighten(factor) gives (objective, gradient), or an object that has them: the rest stays as it is.
+    tighten(factor) returns (objective, gradient), or an object that has them; everything else stays.
     """
-    p = vector(start, None, "start")
-    if not np.isfinite(p).all():
-        raise InputError(f"check: start[{int(np.flatnonzero(~np.isfinite(p))[0])}] is not finite - start somewhere")
+    p = _vector(start, None, "start")
     n_p = len(p)
-    s = natural_scale(p) if scale is None else vector(scale, n_p, "scale")
-    if not ((s > 0) & np.isfinite(s)).all():
-        i = int(np.flatnonzero(~((s > 0) & np.isfinite(s)))[0])
-        raise InputError(f"check: scale[{i}] = {s[i]:g} - give scales > 0 and finite")
+    _all(np.isfinite(p), lambda i: f"start[{i}] is not finite - start at a finite point")
+    s = _natural_scale(p) if scale is None else _vector(scale, n_p, "scale")
+    _all((s > 0) & np.isfinite(s), lambda i: f"scale[{i}] = {s[i]:g} - give scales > 0 and finite")
     lower, upper = _bounds(bounds, n_p)
-    crossed = np.flatnonzero(~(lower < upper))
-    if crossed.size:
-        i = int(crossed[0])
-        raise InputError(f"check: bounds[{i}] = {lower[i]:g} to {upper[i]:g} - give (lower, upper), lower < upper")
-    outside = np.flatnonzero((p < lower) | (p > upper))
-    if outside.size:
-        i = int(outside[0])
-        raise InputError(
-            f"check: start[{i}] = {p[i]:g} is outside its bounds {lower[i]:g} to {upper[i]:g} - start inside"
-        )
+    spans = [f"{a:g} to {b:g}" for a, b in zip(lower, upper, strict=True)]
+    _all(lower < upper, lambda i: f"bounds[{i}] = {spans[i]} - give (lower, upper), lower < upper")
+    inside = (p >= lower) & (p <= upper)
+    _all(inside, lambda i: f"start[{i}] = {p[i]:g} is outside its bounds {spans[i]} - start inside")
     label = default_label if names is None else _labels(names, n_p)
     made = Subject(name, objective, gradient, p, s, lower, upper, label=label)
 
@@ -117,29 +95,57 @@ def subject(
     )
 
 
+def _all(holds: Array, otherwise: Callable[[int], str]) -> None:
+    """Raises InputError for the first component that does not."""
+    wrong = np.flatnonzero(~holds)
+    if wrong.size:
+        raise InputError(f"check: {otherwise(int(wrong[0]))}")
+
+
+def _natural_scale(p: Array) -> Array:
+    """The default natural changes: |p_i|, and for zeros the median of the others, or 1."""
+    size = np.abs(p)
+    others = size[size > 0]
+    return np.where(size > 0, size, np.median(others) if others.size else 1.0)
+
+
+def _vector(values: Any, n_p: int | None, what: str) -> Array:
+    """A float64 copy (n_p,) of what a user gave. Raises InputError."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"check: {what} is no array of real numbers ({error}) - give one of length n_p") from error
+    if array.ndim == 0 and n_p is not None:
+        array = np.full(n_p, float(array))
+    if array.ndim != 1 or array.size == 0 or (n_p is not None and array.size != n_p):
+        wanted = "a vector" if n_p is None else f"{n_p} of them"
+        raise InputError(f"check: {what} has the shape {array.shape} - give {wanted}")
+    _all(~np.isnan(array), lambda i: f"{what}[{i}] is NaN - give numbers")
+    return array
+
+
 def _labels(names: Any, n_p: int) -> Callable[[int], str]:
     try:
         given = [str(name) for name in names]
     except TypeError:
-        raise InputError(f"check: names={names!r} - give one name a parameter") from None
+        raise InputError(f"check: names={names!r} - give one name for each parameter") from None
     if isinstance(names, str) or len(given) != n_p:
         raise InputError(f"check: {len(given)} names for {n_p} parameters - give one each")
     return lambda i: given[i]
 
 
 def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:
-    if bounds is None:
-        return np.full(n_p, -np.inf), np.full(n_p, np.inf)
+    """lower and upper (n_p,) from a pair of numbers or arrays, or from SciPy's list of pairs; None is no bound."""
     try:
-        pair = list(bounds)
+        pair: list[Any] = [None, None] if bounds is None else list(bounds)
     except TypeError:
         pair = []
-    if len(pair) == n_p != 2 and all(np.size(b) == 2 for b in pair):  # SciPy's list of pairs, None for no bound
+    if len(pair) == n_p != 2 and all(np.size(b) == 2 for b in pair):
         pair = [[b[k] for b in pair] for k in (0, 1)]
     if len(pair) != 2:
         raise InputError(f"check: bounds={bounds!r} - give (lower, upper), numbers or arrays, or one pair a parameter")
     ends = [_without_none(end, limit) for end, limit in zip(pair, (-np.inf, np.inf), strict=True)]
-    lower, upper = (vector(end, n_p, f"bounds[{k}]") for k, end in enumerate(ends))
+    lower, upper = (_vector(end, n_p, f"bounds[{k}]") for k, end in enumerate(ends))
     return lower, upper
 
 
@@ -150,7 +156,7 @@ def _without_none(end: Any, limit: float) -> Any:
 
 
 def _made(thing: Any, name: str) -> Any:
-    """The object itself, or what the class or function given makes."""
+    """The object itself, or what the class or function given returns."""
     ready = callable(getattr(thing, "gradient", None)) or callable(getattr(thing, "value_and_gradient", None))
     if not isinstance(thing, type) and (ready or not callable(thing)):
         return thing
@@ -162,4 +168,4 @@ def _made(thing: Any, name: str) -> Any:
             " gradient(p) and start, or give --objective and --gradient"
         ) from error
     except FOREIGN as error:
-        raise InputError(f"check: {name} cannot be made: {type(error).__name__}: {error} - mend it") from error
+        raise InputError(f"check: {name} cannot be built: {type(error).__name__}: {error} - correct it") from error

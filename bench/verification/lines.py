@@ -1,39 +1,55 @@
-"""The lines of a check as cells: one row a line, the same in a terminal and on a page."""
+"""Lines through p along which J is differenced: single components and random directions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from gradient_routes.bench.render.format import number
-from gradient_routes.bench.verification.reading import Reading
-from gradient_routes.bench.verification.result import Check
+import numpy as np
 
-HEADINGS = ("line", "says", "off by", "known to", "slopes", "floor", "at h")
-LEGEND = (
-    "off by: |gradient - quotient|, known to: what quotients are uncertain by, both relative to the whole gradient,"
-    " with * to the component itself; slopes: of the error over h, one-sided, central, round-off; floor: its least,"
-    " about the plateau where there is one, at h relative to max(|p_i|, s_i)"
-)
+from gradient_routes.bench.verification.subject import Subject
+from gradient_routes.problems.problem import Array
+
+MARGIN = 1e-3  # distance to a bound, in natural changes, below which a line only goes inward
 
 
-def rows(check: Check) -> Iterator[tuple[Reading, tuple[str, ...]]]:
-    """Every line, then the tightened ones."""
-    for reading in check.readings:
-        yield reading, _cells(reading.sweep.line.name, reading)
-    for t in check.tightened:
-        yield t.reading, _cells(f"{t.reading.sweep.line.name}, tightened x {t.factor:g}", t.reading)
+@dataclass(frozen=True)
+class Line:
+    """The line p + t v. v (n_p,) is a natural change: w_i e_i for component i, xi_i w_i for a random direction."""
+
+    name: str
+    v: Array
+    index: int | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether the line changes every component."""
+        return bool(self.v.all())
 
 
-def _cells(name: str, reading: Reading) -> tuple[str, ...]:
-    known = reading.level is not None
-    curve = reading.central if reading.sweep.two_sided else reading.one_sided
-    slopes = (reading.one_sided.slope, reading.central.slope, curve.roundoff)
-    return (
-        name,
-        "not looked at" if not known and not reading.looked_at else reading.says,
-        (number(reading.off, 2) + ("*" if reading.own_scale else "")) if known else "",
-        number(reading.known_to, 2) if known else "",
-        " ".join(number(s, 2) or "-" for s in slopes) if any(slopes) else "",
-        number(curve.floor, 2),
-        number(curve.best_step, 2),
-    )
+def components(subject: Subject, indices: Sequence[int]) -> list[Line]:
+    """One line along each of these components."""
+    every = np.arange(len(subject.p))
+    return [Line(subject.label(int(i)), np.where(every == i, subject.natural, 0.0), int(i)) for i in indices]
+
+
+def directions(subject: Subject, count: int, seed: int) -> list[Line]:
+    """Random lines that change every component: xi_i of random sign and of size 1/2 to 3/2.
+
+    They are independent of the gradient. Components on or near a bound move inward for positive steps, so that one
+    side of the line is admissible.
+    """
+    rng, n_p = np.random.default_rng(seed), len(subject.p)
+    xi = rng.choice([-1.0, 1.0], (count, n_p)) * rng.uniform(0.5, 1.5, (count, n_p))
+    margin = MARGIN * subject.natural
+    xi = np.where(subject.p - subject.lower < margin, np.abs(xi), xi)
+    xi = np.where(subject.upper - subject.p < margin, -np.abs(xi), xi)
+    return [Line(f"random direction {k + 1}", x * subject.natural) for k, x in enumerate(xi)]
+
+
+def by_sensitivity(gradient: Array, natural: Array, count: int) -> list[int]:
+    """The components of largest, median and smallest sensitivity |g_i w_i|, then others between them."""
+    order = np.argsort(-np.abs(gradient * natural), kind="stable")
+    n = len(order)
+    places = [0, n // 2, n - 1, *np.linspace(0, n - 1, count + 2).astype(int)[1:-1]]
+    return list(dict.fromkeys(int(order[place]) for place in places))[:count]

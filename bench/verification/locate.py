@@ -1,27 +1,28 @@
-"""Which components of a gradient are wrong, by halving: a direction restricted to half of them tells which half."""
+"""Which components of a gradient are wrong, by bisection: a direction along half of them tells which half is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gradient_routes.bench.verification.guarded import Guarded
-from gradient_routes.bench.verification.line import Line, components, sweep
+from gradient_routes.bench.verification.examine import Examination
+from gradient_routes.bench.verification.lines import Line, components
 from gradient_routes.bench.verification.plateau import DIFFERENT
+from gradient_routes.bench.verification.quotients import Quotients, quotients
 from gradient_routes.bench.verification.reading import Reading
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
 
-MOST = 4  # wrong components searched for; more make the whole gradient suspect
+MOST = 4  # wrong components searched for, beyond those found on the lines of the plan
 AROUND = 10.0 ** np.array([-0.5, 0.0, 0.5])  # steps about the best one, to measure a component that was found
-ALIKE = 0.02  # relative scatter of factors that are one factor
+ALIKE = 0.02  # relative scatter of factors that are the same factor
 
 
 @dataclass(frozen=True)
 class Worst:
-    """A wrong component: given and by differences, dJ/dp_i both."""
+    """A wrong component: dJ/dp_i given by the gradient and found by differences."""
 
     name: str
     index: int
@@ -41,10 +42,10 @@ class Worst:
 
 @dataclass(frozen=True)
 class Located:
-    """worst components, largest first, and right, how many others were then found right; 0 where that is not known.
+    """Wrong components, largest error first, and how many of the others are right; 0 where that is unknown.
 
     slope      given / found of the whole gradient along the direction that showed the plateau
-    everywhere more are wrong than were searched for
+    everywhere more components are wrong than were searched for
     """
 
     worst: tuple[Worst, ...]
@@ -54,7 +55,7 @@ class Located:
 
     @property
     def factor(self) -> float | None:
-        """The one factor that the wrong components and the whole gradient are off by, if there is one."""
+        """The common factor of the wrong components and the whole gradient, if there is one."""
         factors = [w.factor for w in self.worst] + [self.slope]
         if len(factors) < 3 or None in factors:
             return None
@@ -64,71 +65,70 @@ class Located:
 
 
 class Search:
-    """Restricted directions at one step, against what noise and truncation allow at that step."""
+    """Directions along some components, at the one step where noise and truncation are least."""
 
-    def __init__(self, J: Guarded, J_0: float, subject: Subject, gradient: Array, plateau: Reading, seed: int) -> None:
+    def __init__(self, seen: Examination, plateau: Reading) -> None:
         assert plateau.level is not None
-        self.J, self.J_0, self.subject = J, J_0, subject
-        self.gradient, self.w = gradient.copy(), subject.natural
+        self.seen, self.plateau, self.gradient = seen, plateau, seen.gradient.copy()
         self.h = np.array([plateau.level.h])
         self.allowed = max(DIFFERENT * plateau.level.uncertainty, plateau.accepted * plateau.size, plateau.by_nature)
-        self.rng = np.random.default_rng(seed)
-        self.plateau = plateau
+        self.rng = np.random.default_rng(seen.plan.seed + 1)
 
     @property
     def ratio(self) -> float | None:
         """The slope given / the quotient found, along the whole direction."""
         return self.plateau.slope / self.plateau.quotient if self.plateau.quotient else None
 
-    def off(self, members: Array) -> float:
-        """|quotient - slope| along a random direction of these components; two calls."""
-        v = np.zeros_like(self.w)
-        xi = self.rng.choice([-1.0, 1.0], len(members)) * self.rng.uniform(0.75, 1.25, len(members))
-        v[members] = xi * self.w[members]
-        s = sweep(self.J, self.J_0, self.subject, self.gradient, Line("", v), self.h)
-        off = s.off_central if s.two_sided else s.off_forward
-        return float(np.abs(off[0]))
+    def can_call(self, points: int) -> bool:
+        """Whether the budget allows two calls at so many steps."""
+        return self.seen.J.left() >= 2 * points
 
     def wrong(self, members: Array) -> bool:
-        return len(members) > 0 and not self.off(members) <= self.allowed
+        """Whether a random direction along these components differs by more than the margin allows; two calls."""
+        if not len(members):
+            return False
+        v = np.zeros_like(self.gradient)
+        xi = self.rng.choice([-1.0, 1.0], len(members)) * self.rng.uniform(0.75, 1.25, len(members))
+        v[members] = xi * self.seen.subject.natural[members]
+        return not abs(self._along(Line("", v), self.h).off[0]) <= self.allowed
 
     def one(self, members: Array) -> int | None:
-        """A component among members that are wrong together: the left half tells which half; None without calls."""
+        """A wrong component among members of which some are; None where the calls do not suffice."""
         while len(members) > 1:
-            if self.J.left() < 2:
+            if not self.can_call(1):
                 return None
             left, right = np.array_split(members, 2)
             members = left if self.wrong(left) else right
         return int(members[0])
 
     def measure(self, i: int) -> Worst | None:
-        """The component by differences; None where it agrees after all."""
-        if self.J.left() < 2 * len(AROUND):
+        """The component by differences; None where it agrees."""
+        if not self.can_call(len(AROUND)):
             return None
-        (line,) = components(self.subject, [i])
-        s = sweep(self.J, self.J_0, self.subject, self.gradient, line, self.h * AROUND)
-        like = self.plateau
-        reading = Reading(s, like.noise, like.size, like.accepted, like.by_nature)
-        return wrong_component(reading, self.subject) if reading.says == "plateau" else None
+        (line,) = components(self.seen.subject, [i])
+        reading = replace(self.plateau, quotients=self._along(line, self.h * AROUND), changes=None, natural_change=0.0)
+        return wrong_component(reading, self.seen.subject) if reading.says == "plateau" else None
+
+    def _along(self, line: Line, h: Array) -> Quotients:
+        return quotients(self.seen.J, self.seen.J_0, self.seen.subject, self.gradient, line, h)
 
 
-def locate(search: Search | None, known: Sequence[Reading], subject: Subject) -> Located:
-    """Find wrong components; `known` are readings of components that were looked at anyway, to which it is confined
-    where no direction shows that there is anything to search for."""
-    worst = [wrong_component(r, subject) for r in known if r.says == "plateau"]
+def locate(seen: Examination, search: Search | None) -> Located:
+    """The wrong components among those of the plan, and, where a direction shows an error, among the others."""
+    known = [r for r in seen.readings if r.index is not None]
+    worst = [wrong_component(r, seen.subject) for r in known if r.says == "plateau"]
+    n_p = len(seen.gradient)
     if search is None:
         return _sorted(worst)
-    n_p = len(search.gradient)
     if len(worst) == len(known) >= 3:
         return _sorted(worst, everywhere=True, slope=search.ratio)
-    looked_at = [r.sweep.line.index for r in known if r.sweep.line.index is not None]
-    if len(looked_at) == n_p:
+    if len(known) == n_p:
         return _sorted(worst, right=n_p - len(worst))
     for w in worst:
         search.gradient[w.index] = w.found
-    others = np.setdiff1d(np.arange(n_p), looked_at)
-    while len(worst) < MOST + len(known):
-        if search.J.left() < 2:
+    others = np.setdiff1d(np.arange(n_p), [r.index for r in known])
+    for _ in range(MOST + len(known) - len(worst)):
+        if not search.can_call(1):
             return _sorted(worst)
         if not search.wrong(others):
             return _sorted(worst, right=n_p - len(worst))
@@ -143,14 +143,13 @@ def locate(search: Search | None, known: Sequence[Reading], subject: Subject) ->
 
 
 def wrong_component(reading: Reading, subject: Subject) -> Worst:
-    i, quotient = reading.sweep.line.index, reading.quotient
+    i, quotient, level = reading.index, reading.quotient, reading.level
     assert i is not None
     assert quotient is not None
-    assert reading.level is not None
+    assert level is not None
     w = float(subject.natural[i])
-    found = quotient / w if abs(quotient) > reading.level.uncertainty else 0.0
-    return Worst(subject.label(i), i, reading.slope / w, found)
+    return Worst(subject.label(i), i, reading.slope / w, quotient / w if abs(quotient) > level.uncertainty else 0.0)
 
 
-def _sorted(worst: list[Worst], right: int = 0, everywhere: bool = False, slope: float | None = None) -> Located:
+def _sorted(worst: Sequence[Worst], right: int = 0, everywhere: bool = False, slope: float | None = None) -> Located:
     return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), right, everywhere, slope)

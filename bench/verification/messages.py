@@ -1,4 +1,4 @@
-"""Verdicts in words: one sentence with the numbers, and the next thing to do."""
+"""Verdicts in words: one sentence with the numbers, and what to do next."""
 
 from __future__ import annotations
 
@@ -8,171 +8,185 @@ from dataclasses import replace
 
 import numpy as np
 
-from gradient_routes.bench.verification.curve import Curve
 from gradient_routes.bench.verification.examine import Examination
-from gradient_routes.bench.verification.gradient_call import Unusable
-from gradient_routes.bench.verification.guarded import Accident
+from gradient_routes.bench.verification.guarded import DOUBLE, Accident, Guarded, Unusable
 from gradient_routes.bench.verification.locate import Located, Worst
 from gradient_routes.bench.verification.reading import Reading
-from gradient_routes.bench.verification.result import Check, Verdict
+from gradient_routes.bench.verification.result import Check
 
-SHOWN = 3  # accidents and components named in a sentence
-NEXT_TO_ONE = 0.01
-ODD = 0.25  # off the slopes 1 and 2
-TIGHTEN = "offer tighten(factor), which returns the same thing with its solver tightened"
-
-
-def on_unusable(check: Check, failure: Unusable) -> Check:
-    verdict: Verdict = "wrong-gradient" if failure.wrong else "undetermined"
-    todo = "mend what the gradient returns" if failure.wrong else "mend the gradient, which gives nothing at p"
-    return replace(check, verdict=verdict, says=str(failure), todo=todo)
+SHOWN = 3  # components and lines named in a sentence
+NEXT_TO_ONE = 0.01  # a factor that close to 1 is given by its distance
+ODD = 0.25  # distance from the slopes 1 and 2 that is reported
+TIGHTEN = "offer tighten(factor), which returns the same objective and gradient with a tighter solver tolerance"
+FLOAT64 = "compute in float64 (JAX: jax.config.update('jax_enable_x64', True); PyTorch: dtype=torch.float64)"
 
 
-def undetermined(check: Check, why: str, todo: str) -> Check:
-    return replace(check, verdict="undetermined", says=why, todo=todo)
+def on_unusable(name: str, failure: Unusable) -> Check:
+    if failure.wrong:
+        return Check(name, "wrong-gradient", str(failure), "correct what the gradient returns")
+    return Check(name, "undetermined", str(failure), "make the gradient computable at p")
 
 
-def on_agreement(check: Check, noisy: Sequence[Reading]) -> Check:
+def on_no_value(name: str, J: Guarded) -> Check:
+    what = J.accidents[0].what if J.accidents else "J is not finite"
+    return Check(name, "undetermined", f"J cannot be evaluated at p: {what}", "start where J is defined")
+
+
+def explained(check: Check, seen: Examination) -> Check:
+    """The check with its sentence, the next step and, on a plateau, the culprit."""
     reading = check.deciding
-    assert reading is not None
-    agreeing = [r for r in check.readings if r.says == "agrees" and (r.sweep.line.index is None or r is reading)]
-    to = max(max(r.off, r.known_to) for r in agreeing)
-    says = (
-        f"differences agree with the gradient to {to:.1e} along {_lines(check)};"
-        f" best step {number(_curve(reading).best_step, 2)}, floor {number(_curve(reading).floor, 2)}"
-    )
-    if noisy:
-        names = ", ".join(r.sweep.line.name for r in noisy[:SHOWN])
-        says += f"; too small for the noise of J to tell: {names}"
-    unsound = [f for f in check.findings if f.sound is False and not f.name.startswith("Taylor")]
-    todo = "use it"
-    if unsound:
-        says += f"; yet {unsound[0].name}: {unsound[0].value:.1e}"
-        todo = f"look at {unsound[0].culprit or unsound[0].name}"
-        if any(f.name.startswith("complex step") for f in unsound):
-            todo = "differences side with the gradient: do J and R take complex numbers (abs, norm, conj do not)?"
-    return replace(check, verdict="agrees", says=says, todo=todo)
-
-
-def on_kink(check: Check, plateaus: Sequence[Reading]) -> Check:
-    reading = check.deciding
-    assert reading is not None
-    where = f"along {reading.sweep.line.name}"
-    h = "" if reading.level is None else f" at h = {reading.level.h_min:.1e}"
-    inside = "" if not reading.inside else f"{reading.inside} active-set changes inside the stencil{h}"
-    if reading.kink is None:
-        says = f"{inside} {where}: J has a kink there, and quotients mix its two slopes"
+    if reading is None:
+        says = "no line has three steps at which J is finite"
+        return replace(check, says=says, todo="make J computable near p, or correct its bounds")
+    if reading.says == "plateau":
+        return _on_plateau(check, reading)
+    if check.verdict == "non-smooth":
+        says, todo = _on_kink(check, reading)
+    elif check.verdict == "agrees":
+        says, todo = _on_agreement(check, reading)
     else:
-        says = f"one-sided quotients {where} converge to numbers {reading.kink:.2g} apart, relative to them"
+        says, todo = _on_noise(check, reading, seen.J.eps > DOUBLE)
+    return replace(check, says=says, todo=todo)
+
+
+def _on_agreement(check: Check, reading: Reading) -> tuple[str, str]:
+    agreeing = [r for r in check.readings if r.says == "agrees"]
+    directions = sum(r.index is None for r in agreeing)
+    counts = ((directions, "random direction"), (len(agreeing) - directions, "component"))
+    lines = " and ".join(f"{n} {what}{'s' if n > 1 else ''}" for n, what in counts if n)
+    to = max(max(r.off, r.known_to) for r in agreeing if r.index is None or r is reading)
+    says = (
+        f"difference quotients agree with the gradient to {to:.1e} along {lines};"
+        f" best step {number(reading.curve.best_step, 2)}, floor {number(reading.curve.floor, 2)}"
+    )
+    noisy = [r.name for r in check.readings if r.says == "noise"]
+    if noisy:
+        says += f"; too small to test above the noise of J: {', '.join(noisy[:SHOWN])}"
+    failed = [f for f in check.findings if f.sound is False and not f.name.startswith("Taylor")]
+    if not failed:
+        return says, "use the gradient"
+    says += f"; but {failed[0].name}: {failed[0].value:.1e}, limit {failed[0].limit:.1e}"
+    if any(f.name.startswith("complex step") for f in failed):
+        return says, "check that J and R are complex-differentiable: abs, norm and conj are not"
+    return says, f"look at {failed[0].culprit or failed[0].name}"
+
+
+def _on_kink(check: Check, reading: Reading) -> tuple[str, str]:
+    where = f"along {reading.name}"
+    at = "" if reading.level is None else f" of step {reading.level.h_min:.1e}"
+    inside = f"the active set changes {reading.inside} times inside the stencil{at}" if reading.inside else ""
+    if reading.kink is None:
+        says = f"{inside} {where}: J has a kink there, and difference quotients mix its two slopes"
+    else:
+        says = f"one-sided quotients {where} converge to limits {reading.kink:.2g} apart, relative to them"
         says += f"; {inside}" if inside else ""
-    todo = "move p off the kink, or difference to one side of it only: the gradient lies between the slopes of the two"
-    if plateaus:
-        worst = max(plateaus, key=lambda r: r.off)
-        todo += f"; along {worst.sweep.line.name}, which is smooth, it is off by {worst.off:.2g} {_relative_to(worst)}"
-    return replace(check, verdict="non-smooth", says=says, todo=todo)
+    todo = "move p off the kink, or use one-sided differences: the gradient lies between the slopes of the two sides"
+    smooth = max((r for r in check.readings if r.says == "plateau"), key=lambda r: r.off, default=None)
+    if smooth is not None:
+        todo += f"; along {smooth.name}, where J is smooth, it is off by {smooth.off:.2g} {_relative(smooth)}"
+    return says, todo
 
 
-def on_noise(check: Check) -> Check:
-    reading = check.deciding
-    assert reading is not None
+def _on_noise(check: Check, reading: Reading, single: bool) -> tuple[str, str]:
     noise = f"J scatters by {reading.noise:.1e}"
-    if check.tightened and check.tightened[-1].reading.says == "agrees":
+    if check.verdict == "solver-limited":
         last = check.tightened[-1]
-        says = (
-            f"{noise} until its forward solve is tightened by {last.factor:g}: then differences agree to"
-            f" {last.reading.known_to:.1e}"
-        )
-        return replace(check, verdict="solver-limited", says=says, todo=_tighten_for_good(check))
-    says = f"{noise}: the best step leaves a relative uncertainty of {reading.known_to:.1e}, and nothing can be told"
-    todo = "tighten the forward solve"
-    todo += ", or check by other means" if check.tightened or check.not_done else f": {TIGHTEN}"
-    return replace(check, verdict="noise-limited", says=says, todo=todo)
+        says = f"{noise} until its forward solve is tightened by {last.factor:g}"
+        return f"{says}: then the quotients agree to {last.reading.known_to:.1e}", _tighten_by(check, None)
+    says = f"{noise}: the best step leaves a relative uncertainty of {reading.known_to:.1e}, too much to judge"
+    if single:
+        return says, FLOAT64
+    tried = check.tightened or check.not_done
+    return says, "tighten the forward solve" + (", or use another test" if tried else f": {TIGHTEN}")
 
 
-def on_plateau(check: Check, verdict: Verdict) -> Check:
-    reading, located, culprit = check.deciding, check.located, check.culprit
-    assert reading is not None
-    says = f"a plateau of {reading.off:.2g} {_relative_to(reading)} along {reading.sweep.line.name}, whatever the step"
-    if verdict == "solver-limited":
+def _on_plateau(check: Check, reading: Reading) -> Check:
+    convicted, located = check.convicted, check.located
+    proven = None if convicted is None else convicted.culprit
+    says = f"a plateau of {reading.off:.2g} {_relative(reading)} along {reading.name}, at every step size"
+    if check.verdict == "solver-limited":
         last = check.tightened[-1]
         says += f", falls to {last.reading.off:.1e} when the forward solve is tightened by {last.factor:g}"
-        return replace(check, verdict=verdict, says=f"{says}: {_who_moved(check)}", todo=_tighten_for_good(check))
+        says += f": {_what_moved(check)}"
+        return replace(check, says=says, todo=_tighten_by(check, proven), culprit=proven)
     if check.tightened:
-        says += f", does not fall when the forward solve is tightened by {check.tightened[-1].factor:g}"
+        moved = check.verdict == "undetermined" and check.tightened[-1].moved and not check.not_done
+        how = "moves a little" if moved else "does not fall"
+        says += f", {how} when the forward solve is tightened by {check.tightened[-1].factor:g}"
     if check.refined is not None:
         before, after, order = check.refined.before, check.refined.after, check.refined.order
         says += f"; the whole gradient is off by {before:.2g}, and by {after:.2g} on a mesh of half the size"
-        if verdict == "inconsistent-discretization":
-            says += f": it shrinks like h^{order:.1f}"
-            todo = "differentiate what is computed: discretize first, then optimize"
-            return replace(check, verdict=verdict, says=says, todo=todo, culprit="an adjoint discretized on its own")
-        says += f": h^{order:.1f}, no matter of the mesh"
+        if check.verdict == "inconsistent-discretization":
+            says += f": the error shrinks like h^{order:.1f}"
+            todo = "differentiate the discretized problem: discretize first, then optimize"
+            return replace(check, says=says, todo=todo, culprit="an adjoint discretized on its own")
+        says += f": h^{order:.1f}, not a discretization error"
+    culprit = proven
     if located is not None and located.worst:
         says += f"; {_components(located)}"
         culprit = culprit or _component_culprit(located)
-    if verdict == "undetermined":
+    if check.verdict == "undetermined":
         if check.not_done:
-            says += "; whether a tighter solve moves it was not seen"
-            return replace(check, verdict=verdict, says=says, todo=f"mend this: {check.not_done[0]}", culprit=culprit)
-        if check.tightened and check.tightened[-1].moved:
-            says = says.replace("does not fall", "moves a little")
-            return replace(check, verdict=verdict, says=says, todo="tighten the solver farther", culprit=culprit)
-        says += "; so small a plateau may be a loosely solved J as well as a small wrong term"
-        return replace(check, verdict=verdict, says=says, todo=TIGHTEN, culprit=culprit)
+            says, todo = f"{says}; a tighter solve was not tested", f"fix this first: {check.not_done[0]}"
+        elif check.tightened and check.tightened[-1].moved:
+            todo = "tighten the solver further"
+        else:
+            says += "; a loosely solved J can cause so small a plateau as well as a small wrong term"
+            todo = TIGHTEN
+        return replace(check, says=says, todo=todo, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
-    if located is not None and located.everywhere and not check.culprit and not check.findings_of_factors:
+    if located is not None and located.everywhere and not proven and not check.factors_tested:
         todo += "; written as a Problem (CONTRIBUTING.md), its factors are tested one by one"
     if not check.tightened and not check.not_done and not (located is not None and located.right):
         todo += f"; to rule out the solver, {TIGHTEN}"
-    return replace(check, verdict=verdict, says=says, todo=todo, culprit=culprit)
+    return replace(check, says=says, todo=todo, culprit=culprit)
 
 
 def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
-    """What was odd about the subject, and what more calls would settle."""
-    J, said = seen.J, list(seen.asked.remarks)
+    """What is unusual about the subject, and what more calls would show."""
+    J, said = seen.J, list(seen.returned.remarks)
     if J.mutates:
         said.append("the objective changes p in place: it was given copies")
     if seen.remembers:
-        said.append(
-            f"J(p) has changed by {seen.remembers:.1e} after calls at other points: does it start from the last?"
-        )
+        said.append(f"J(p) changed by {seen.remembers:.1e} after calls at other points: does it start from the last?")
     elif len(seen.repeated) > 2:
         said.append(f"J is not deterministic: {len(seen.repeated)} calls at p scatter by {np.std(seen.repeated):.1e}")
-    if J.eps > np.finfo(np.float64).eps:
+    if J.eps > DOUBLE:
         said.append(f"J has the precision of float32: its noise is at least {J.eps * abs(seen.J_0):.1e}")
+    if max(J.eps, seen.returned.eps) > DOUBLE:
+        said.append(f"for a sharper test, {FLOAT64}")
     bound = np.flatnonzero((seen.subject.p <= seen.subject.lower) | (seen.subject.p >= seen.subject.upper))
     if bound.size:
         names = ", ".join(seen.subject.label(int(i)) for i in bound[:SHOWN])
-        said.append(f"on their bounds, differenced to one side: {names}" + (" ..." if bound.size > SHOWN else ""))
+        said.append(f"on their bounds, differenced on one side: {names}" + (" ..." if bound.size > SHOWN else ""))
     if J.accidents:
         said.append(_accidents(J.accidents, seen))
-    flat = [r for r in check.readings if r.looked_at and np.isfinite(r.sweep.forward).any()]
-    if flat and all(not np.nan_to_num(r.sweep.forward).any() for r in flat):
-        said.append("J has not changed at all: does it depend on p?")
-    scaled = [
-        r.sweep.line.name for r in check.readings if r.sweep.line.index is not None and r.level and not r.own_scale
-    ]
-    if scaled and check.verdict == "agrees" and len(seen.subject.p) > 1:
-        said.append(f"relative to the whole gradient, being too small to stand alone: {', '.join(scaled[:SHOWN])}")
+    changes = [np.nan_to_num(r.quotients.forward).any() for r in check.readings if _has_values(r)]
+    if changes and not any(changes):
+        said.append("J did not change at all: does it depend on p?")
     if check.verdict == "agrees" and check.deciding is not None:
+        scaled = [r.name for r in check.readings if r.index is not None and r.level and not r.own_scale]
+        if scaled and len(seen.subject.p) > 1:
+            said.append(f"tested relative to the whole gradient, too small on their own: {', '.join(scaled[:SHOWN])}")
         said += _odd_slopes(check.deciding)
-    unread = sum(r.says == "nothing" for r in check.readings)
     if J.left() < 2 and math.isfinite(seen.plan.budget):
-        what = f"; {unread} lines were not looked at" if unread else ""
-        said.append(
-            f"the budget of {seen.plan.budget:g} calls is spent{what}: --budget {2 * seen.plan.budget:g} sees more"
-        )
+        unread = sum(r.says == "nothing" for r in check.readings)
+        what = f"; {unread} lines were not sampled" if unread else ""
+        more = f"--budget {2 * seen.plan.budget:g} tests more"
+        said.append(f"the budget of {seen.plan.budget:g} calls is spent{what}: {more}")
     return tuple(said)
+
+
+def _has_values(reading: Reading) -> bool:
+    return reading.sampled and bool(np.isfinite(reading.quotients.forward).any())
 
 
 def _odd_slopes(reading: Reading) -> list[str]:
     """Truncation slopes that are not 1 and 2."""
     expected = ((reading.one_sided.slope, 1), (reading.central.slope, 2))
     odd = [f"{slope:.2g} instead of {wanted}" for slope, wanted in expected if slope and abs(slope - wanted) > ODD]
-    if not odd:
-        return []
-    why = "J is less smooth than twice differentiable, or its higher derivatives rule"
-    return [f"truncation slopes along {reading.sweep.line.name}: {', '.join(odd)}: {why}"]
+    why = "J is not twice differentiable, or higher derivatives dominate"
+    return [f"truncation slopes along {reading.name}: {', '.join(odd)}: {why}"] if odd else []
 
 
 def _accidents(accidents: Sequence[Accident], seen: Examination) -> str:
@@ -185,43 +199,32 @@ def _accidents(accidents: Sequence[Accident], seen: Examination) -> str:
     return f"{len(accidents)} points left out, the first at {where}{more}: {first.what}"
 
 
-def _lines(check: Check) -> str:
-    count = sum(r.says == "agrees" for r in check.readings)
-    directions = sum(r.says == "agrees" and r.sweep.line.index is None for r in check.readings)
-    parts = [(directions, "random direction"), (count - directions, "component")]
-    return " and ".join(f"{n} {what}{'s' if n > 1 else ''}" for n, what in parts if n)
-
-
-def _curve(reading: Reading) -> Curve:
-    return reading.central if reading.sweep.two_sided else reading.one_sided
-
-
-def _relative_to(reading: Reading) -> str:
+def _relative(reading: Reading) -> str:
     return "of the component" if reading.own_scale else "of the gradient"
 
 
-def _who_moved(check: Check) -> str:
-    """Tightening tells which side was the loose one."""
+def _what_moved(check: Check) -> str:
+    """Tightening shows which side was solved loosely."""
     last = check.tightened[-1]
     if last.reading.says != "agrees":
         return "it is still falling"
     if last.gradient_moved < 0.1 * last.quotient_moved:
-        return f"J moved, the gradient did not ({last.gradient_moved:.0e}): the gradient is sound, J is loosely solved"
+        return f"J moved, the gradient did not ({last.gradient_moved:.0e}): the gradient is right, J is solved loosely"
     if last.quotient_moved < 0.1 * last.gradient_moved:
-        return f"the gradient moved by {last.gradient_moved:.1e}, J did not: the gradient's state is loosely solved"
-    return f"both moved, J's slope by {last.quotient_moved:.1e}, the gradient by {last.gradient_moved:.1e}"
+        return f"the gradient moved by {last.gradient_moved:.1e}, J did not: its state is solved loosely"
+    return f"both moved, the slope of J by {last.quotient_moved:.1e}, the gradient by {last.gradient_moved:.1e}"
 
 
-def _tighten_for_good(check: Check) -> str:
-    todo = f"divide the solver's tolerance by {1.0 / check.tightened[-1].factor:g}"
-    return f"{todo}; look at {check.culprit}" if check.culprit else todo
+def _tighten_by(check: Check, culprit: str | None) -> str:
+    todo = f"divide the solver tolerance by {1.0 / check.tightened[-1].factor:g}"
+    return f"{todo}; look at {culprit}" if culprit else todo
 
 
 def _components(located: Located) -> str:
     w = located.worst[0]
     named = ", ".join(x.name for x in located.worst[:SHOWN])
     if located.everywhere and located.factor is not None:
-        return f"all components looked at ({named}) are off by {_factor(located.factor)}, as is the whole"
+        return f"all tested components ({named}) and the whole gradient are off by {_factor(located.factor)}"
     if located.everywhere:
         return f"many components are wrong, {named} among them: {_pair(w)}"
     if located.right:
@@ -230,12 +233,11 @@ def _components(located: Located) -> str:
 
 
 def _pair(w: Worst) -> str:
-    factor = "" if w.factor is None else f", {_factor(w.factor)}"
-    return f"the gradient says {w.given:.6g} where differences say {w.found:.6g}{factor}"
+    factor = "" if w.factor is None else f", off by {_factor(w.factor)}"
+    return f"gradient {w.given:.6g}, differences {w.found:.6g}{factor}"
 
 
 def _factor(factor: float) -> str:
-    """A factor next to 1 is told by its distance, -1 by its name."""
     if abs(factor + 1.0) < NEXT_TO_ONE**2:
         return "its sign"
     return f"the factor {factor:.3g}" if abs(factor - 1.0) >= NEXT_TO_ONE else f"{abs(factor - 1.0):.1e} of it"

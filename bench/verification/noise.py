@@ -1,4 +1,4 @@
-"""The noise of an objective, from values it has already given."""
+"""The noise of an objective, estimated from values it has already returned."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ import math
 
 import numpy as np
 
-from gradient_routes.bench.verification.line import Sweep
+from gradient_routes.bench.verification.quotients import Quotients
 from gradient_routes.problems.problem import Array
 
-WINDOW = 5  # steps whose median second difference is taken: one dead or lucky point decides nothing
+WINDOW = 5  # steps per running median: one outlier changes nothing
 NORMAL = 0.6745  # median of |x| for x standard normal
 REPRESENTABLE = 0.29  # standard deviation of rounding to the nearest number, in eps
 
 
-def noise(sweep: Sweep, eps: float, repeated: Array) -> float:
-    """Standard deviation of one evaluation of J near p.
+def noise(q: Quotients, eps: float, repeated: Array) -> float:
+    """Standard deviation of one evaluation of J near p: the largest of three estimates.
 
-    The second difference J(p + h) - 2 J(p) + J(p - h) is truncation where h is large and has the variance 6 sigma^2
-    where it is small (Hamming 1973, chapter 6; More & Wild 2011): the least of its running medians counts. Or, if that
-    is more, what `repeated` evaluations at p scatter by, or the rounding of J: to the spacing of floating-point
-    numbers, or, where steps leave J as it is to the last digit, to the least distance between any two values seen:
-    that is larger where J is printed or cancels.
+    - The second difference J(p + h) - 2 J(p) + J(p - h) is truncation error at large h and has the variance 6 sigma^2
+      at small h (Hamming 1973, chapter 6; More & Wild 2011). The least of its running medians is used.
+    - The standard deviation of `repeated` evaluations at p.
+    - The rounding of J: the spacing of floating-point numbers, or, where some step leaves J unchanged, the least
+      distance between two values seen, which is larger where J is printed or cancels.
     """
-    second = np.abs(sweep.jump * sweep.h)
-    if not sweep.two_sided:  # a step is lost to the slope, which the gradient predicts
-        second = np.abs(sweep.off_forward * sweep.h) * np.sqrt(3.0)
-    visible = second[np.isfinite(second)]
-    count = min(WINDOW, len(visible))
-    medians = [np.median(visible[k : k + count]) for k in range(len(visible) - count + 1)] if count > 2 else [0.0]
+    second = np.abs(q.jump * q.h)
+    if not q.two_sided:  # one side only: subtract the slope predicted by the gradient instead
+        second = np.abs(q.off_forward * q.h) * np.sqrt(3.0)
+    known = second[np.isfinite(second)]
+    count = min(WINDOW, len(known))
+    medians = [np.median(known[k : k + count]) for k in range(len(known) - count + 1)] if count > 2 else [0.0]
     scatter = float(np.std(repeated, ddof=1)) if len(repeated) > 1 else 0.0
-    seen = np.concatenate([sweep.J_plus, sweep.J_minus, [sweep.J]])
+    seen = np.concatenate([q.J_plus, q.J_minus, [q.J]])
     gaps = np.diff(np.unique(seen[np.isfinite(seen)]))
-    still = np.count_nonzero(seen == sweep.J) > 1  # J itself is one of them
-    rounding = REPRESENTABLE * max(eps * abs(sweep.J), float(gaps.min()) if gaps.size and still else 0.0)
+    unchanged = np.count_nonzero(seen == q.J) > 1  # J itself is one of them
+    rounding = REPRESENTABLE * max(eps * abs(q.J), float(gaps.min()) if gaps.size and unchanged else 0.0)
     return max(float(min(medians)) / (NORMAL * math.sqrt(6.0)), scatter, rounding)

@@ -10,9 +10,9 @@ from html import escape
 import numpy as np
 
 from gradient_routes.bench.render.format import number
-from gradient_routes.bench.verification.lines import HEADINGS, LEGEND, rows
 from gradient_routes.bench.verification.reading import Reading
 from gradient_routes.bench.verification.result import Check
+from gradient_routes.bench.verification.table import HEADINGS, LEGEND, rows
 from gradient_routes.problems.problem import Array
 
 COLOURS = {"agrees": "#009E73", "wrong-gradient": "#D55E00", "inconsistent-discretization": "#D55E00"}
@@ -72,21 +72,23 @@ def _drawn(check: Check) -> list[Reading]:
     """The deciding line first, then the others that were swept as widely."""
     if check.deciding is None:
         return []
-    others = [r for r in check.readings if r is not check.deciding and len(r.sweep.h) >= len(check.deciding.sweep.h)]
+    others = [
+        r for r in check.readings if r is not check.deciding and len(r.quotients.h) >= len(check.deciding.quotients.h)
+    ]
     return [check.deciding, *others]
 
 
 def curves(check: Check, reading: Reading) -> tuple[str, list[Trace]]:
     """A title and the errors of one line, with those of the tightened solve where it was this line's."""
-    made, scale = reading.sweep, reading.scale or 1.0
+    made, scale = reading.quotients, reading.scale or 1.0
     found = [
         Trace("one-sided", made.h, np.abs(made.off_forward) / scale, "#E69F00"),
         Trace("central", made.h, np.abs(made.off_central) / scale, "#D55E00"),
     ]
     for t, colour in zip(check.tightened, TIGHTENED, strict=False):
-        if t.reading.sweep.line.name == made.line.name:
-            errors = np.abs(t.reading.sweep.off_central) / scale
-            found.append(Trace(f"central, tightened x {t.factor:g}", t.reading.sweep.h, errors, colour))
+        if t.reading.quotients.line.name == made.line.name:
+            errors = np.abs(t.reading.quotients.off_central) / scale
+            found.append(Trace(f"central, tightened x {t.factor:g}", t.reading.quotients.h, errors, colour))
     if reading.noise:
         least = min((10.0**y for c in found for _, y in c.points), default=0.0)
         noise = reading.noise / (math.sqrt(2.0) * made.h) / scale

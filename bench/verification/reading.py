@@ -1,4 +1,4 @@
-"""What the quotients on one line say of a gradient: it agrees, it is off by so much, or they cannot tell."""
+"""What the quotients on one line say about a gradient: it agrees, it differs, or they cannot tell."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ import numpy as np
 
 from gradient_routes.bench.verification.curve import Curve, fit
 from gradient_routes.bench.verification.guarded import FOREIGN
-from gradient_routes.bench.verification.line import Sweep
 from gradient_routes.bench.verification.plateau import DIFFERENT, Level, level
+from gradient_routes.bench.verification.quotients import Quotients
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
 
 Says = Literal["agrees", "plateau", "kink", "noise", "nothing"]
-RESOLVED = 1e-3  # relative uncertainty of a quotient that can judge anything
-NEARER = 0.1  # the same of smaller steps that contradict larger ones
-ZERO = 1e3 * float(np.finfo(np.float64).eps)  # of what J changes by in natural steps, a slope that is rounding
-TINY = 1e-6  # relative jump of one-sided quotients that is no kink worth the name
+RESOLVED = 1e-3  # largest relative uncertainty of a quotient that can judge a gradient
+NEARER = 0.1  # the same for smaller steps that contradict larger ones
+ZERO = 1e3 * float(np.finfo(np.float64).eps)  # a slope below this part of the change of J is rounding
+TINY = 1e-6  # relative jump of one-sided quotients that is not a kink
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A sweep read against a gradient.
+    """Quotients compared with the slope of a gradient.
 
     noise    standard deviation of J
-    size     |g w|_2, what slopes along natural changes are to be compared with
-    accepted relative error that is none
-    by_nature error of slopes that is none: of gradients made of differences, say, which know nothing of components
-    natural_change  what J was seen to change by in natural steps along another line
-    changes  step -> how often the active set changes inside its stencil, where the subject knows
+    size     |g w|_2, the expected slope along natural changes
+    accepted relative error that counts as agreement
+    by_nature absolute error of slopes that the gradient may have by its nature, as one by finite differences
+    changes  step -> number of active-set changes inside its stencil, where the subject knows
+    natural_change  what J changed by in natural steps along another line
     """
 
-    sweep: Sweep
+    quotients: Quotients
     noise: float
     size: float
     accepted: float
@@ -44,55 +44,64 @@ class Reading:
     changes: Callable[[float], int] | None = None
     natural_change: float = 0.0
 
+    @property
+    def name(self) -> str:
+        return self.quotients.line.name
+
+    @property
+    def index(self) -> int | None:
+        """The component, where the line is one."""
+        return self.quotients.line.index
+
     @cached_property
     def level(self) -> Level | None:
-        """Of quotient less slope: where its value is zero within its uncertainty, the gradient is right."""
-        s = self.sweep
-        q, noise = (s.off_central, self.noise / np.sqrt(2.0)) if s.two_sided else (s.off_forward, 1.5 * self.noise)
-        return level(s.h, q, noise, NEARER * self.size)
+        """Of quotient less slope: the gradient is right where the value is zero within its uncertainty."""
+        q = self.quotients
+        noise = self.noise / np.sqrt(2.0) if q.two_sided else 1.5 * self.noise
+        return level(q.h, q.off, noise, NEARER * self.size)
 
     @cached_property
     def slope(self) -> float:
-        """g . v, as the gradient says."""
-        slopes = np.concatenate([self.sweep.s_plus, self.sweep.s_minus])
+        """g . v, by the gradient."""
+        slopes = np.concatenate([self.quotients.s_plus, self.quotients.s_minus])
         known = slopes[np.isfinite(slopes)]
         return float(np.median(known)) if known.size else float("nan")
 
     @property
     def quotient(self) -> float | None:
-        """The slope that differences give."""
+        """The slope by differences."""
         return None if self.level is None else self.slope + self.level.value
 
     @cached_property
     def scale(self) -> float:
-        """What errors are relative to: a component's own slope where differences resolve it, else the gradient's.
+        """What errors are relative to: a component's own slope where differences resolve it, else the gradient's size.
 
-        A random direction may meet a gradient at any angle: its errors are always relative to the gradient. Where that
-        is zero up to rounding, as at a minimum, they are relative to what J changes by in natural steps.
+        A random direction may be nearly orthogonal to the gradient: its errors are always relative to the size. Where
+        that is rounding only, as at a minimum, they are relative to what J changes by in natural steps.
         """
         own = abs(self.slope) if self.quotient is None else max(abs(self.slope), abs(self.quotient))
         change = max(self.change, self.natural_change)
-        known = self.level is not None and self.level.uncertainty <= RESOLVED * own and own > ZERO * change
-        if known and self.sweep.line.index is not None:
+        resolved = self.level is not None and self.level.uncertainty <= RESOLVED * own and own > ZERO * change
+        if resolved and self.index is not None:
             return own
         whole = max(self.size, own)
         return whole if whole > ZERO * change else change
 
     @cached_property
     def change(self) -> float:
-        """The largest |J(p +- h v) - J(p)| seen."""
-        seen = np.abs(np.concatenate([self.sweep.J_plus, self.sweep.J_minus]) - self.sweep.J)
+        """The largest |J(p +- h v) - J(p)|."""
+        seen = np.abs(np.concatenate([self.quotients.J_plus, self.quotients.J_minus]) - self.quotients.J)
         return float(np.nanmax(seen)) if np.isfinite(seen).any() else 0.0
 
     @property
     def own_scale(self) -> bool:
-        """Whether that is a component's own slope."""
-        return self.sweep.line.index is not None and self.scale < self.size
+        """Whether errors are relative to the component's own slope."""
+        return self.index is not None and self.scale < self.size
 
     @property
-    def looked_at(self) -> bool:
-        """Whether there were calls left for it."""
-        return bool(np.isfinite(self.sweep.s_plus).any() or np.isfinite(self.sweep.s_minus).any())
+    def sampled(self) -> bool:
+        """Whether J was called on this line at all."""
+        return bool(np.isfinite([self.quotients.s_plus, self.quotients.s_minus]).any())
 
     @property
     def off(self) -> float:
@@ -102,23 +111,23 @@ class Reading:
 
     @property
     def known_to(self) -> float:
-        """Uncertainty of that."""
+        """The uncertainty of `off`."""
         assert self.level is not None
         return self.level.uncertainty / self.scale if self.scale else 0.0
 
     @cached_property
     def _jump(self) -> Level | None:
-        """Between one-sided slopes, where it is one; None where J is smooth as far as quotients tell."""
-        if not self.sweep.two_sided:
+        """The difference of the one-sided slopes; None where J is smooth as far as the quotients show."""
+        if not self.quotients.two_sided:
             return None
-        found = level(self.sweep.h, self.sweep.jump, np.sqrt(6.0) * self.noise, NEARER * self.size)
+        found = level(self.quotients.h, self.quotients.jump, np.sqrt(6.0) * self.noise, NEARER * self.size)
         if found is None or abs(found.value) <= max(DIFFERENT * found.uncertainty, TINY * self.scale):
             return None
         return found
 
     @property
     def kink(self) -> float | None:
-        """That jump, relative to the slopes; None where there is none."""
+        """That difference relative to the slopes; None where there is none."""
         if self._jump is None:
             return None
         jump = abs(self._jump.value)
@@ -126,7 +135,7 @@ class Reading:
 
     @property
     def between(self) -> bool:
-        """Whether the gradient's slope lies between the one-sided ones, or is one of them."""
+        """Whether the slope of the gradient lies between the one-sided slopes, ends included."""
         assert self._jump is not None
         assert self.level is not None
         room = 0.5 * abs(self._jump.value) + DIFFERENT * (self._jump.uncertainty + self.level.uncertainty)
@@ -134,44 +143,46 @@ class Reading:
 
     @cached_property
     def inside(self) -> int | None:
-        """Changes of the active set inside the stencil that the level rests on."""
-        if self.changes is None or self.level is None:
-            return None
-        return self.changes(self.level.h_min)
+        """Active-set changes inside the smallest stencil of the level."""
+        return None if self.changes is None or self.level is None else self.changes(self.level.h_min)
 
     @cached_property
     def says(self) -> Says:
         if self.level is None:
             return "nothing"
-        if (self.kink is not None and self.between) or (self.kink is None and self.inside):
+        if self.inside if self.kink is None else self.between:
             return "kink"
         value, uncertainty = abs(self.level.value), self.level.uncertainty
         by_nature = min(self.by_nature, RESOLVED * self.size)
         if value > max(DIFFERENT * uncertainty, self.accepted * self.scale, by_nature):
             return "plateau"
-        nothing_changes = self.size == 0.0 == self.change
-        return "agrees" if uncertainty <= RESOLVED * self.scale or nothing_changes else "noise"
-
-    # --- the curves a person looks at
-
-    def errors(self, central: bool) -> Array:
-        """Relative errors (m,) of the quotients: of the gradient; on a plateau, of the level instead."""
-        off = self.sweep.off_central if central else self.sweep.off_forward
-        if self.level is not None and self.off > DIFFERENT * self.known_to:
-            off = off - self.level.value
-        return np.asarray(np.abs(off) / (self.scale or 1.0))
+        constant = self.size == 0.0 == self.change
+        return "agrees" if uncertainty <= RESOLVED * self.scale or constant else "noise"
 
     @cached_property
     def central(self) -> Curve:
-        return fit(self.sweep.h, self.errors(central=True), self.noise / (self.scale or 1.0) / np.sqrt(2.0))
+        """The V-curve of central quotients."""
+        return self._curve(self.quotients.off_central, np.sqrt(2.0))
 
     @cached_property
     def one_sided(self) -> Curve:
-        return fit(self.sweep.h, self.errors(central=False), self.noise / (self.scale or 1.0))
+        return self._curve(self.quotients.off_forward, 1.0)
+
+    @property
+    def curve(self) -> Curve:
+        """The central one where there is one."""
+        return self.central if self.quotients.two_sided else self.one_sided
+
+    def _curve(self, off: Array, quieter: float) -> Curve:
+        """Errors relative to the gradient; on a plateau, to the level. The noise of J is divided by `quieter`."""
+        if self.level is not None and self.off > DIFFERENT * self.known_to:
+            off = off - self.level.value
+        scale = self.scale or 1.0
+        return fit(self.quotients.h, np.abs(off) / scale, self.noise / scale / quieter)
 
 
 def stencil_changes(subject: Subject, v: Array) -> Callable[[float], int] | None:
-    """step -> changes of the active set from p - h v over p to p + h v; points where it is not known do not count."""
+    """step -> changes of the active set from p - h v over p to p + h v; points where it is unknown do not count."""
     active_set = subject.active_set
     if active_set is None:
         return None

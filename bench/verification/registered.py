@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from gradient_routes.routes.synthetic_data import with_synthetic_data
 
 LARGEST = 30_000  # unknowns of a finer mesh: some tens of forward solves there take a minute
 LEAST_RTOL = 1e-15  # below, residuals are rounding
-TIGHT = Solver(rtol=1e-14)  # of complex steps: a judge is no fellow of the judged
+TIGHT = Solver(rtol=1e-14)  # of reference gradients, whatever the solver under test
 
 
 def subject(problem: Problem, route: Route, options: Options, p: Array, solver: Solver) -> Subject:
@@ -30,16 +29,29 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
     objection = route.objection(problem, **options)
     if objection is not None:
         raise InputError(f"check: {objection} - choose another route or problem")
-    parameters, model = problem.parameters, Model(problem, solver)
-    returned: list[Result] = []
+    parameters, model, offers = problem.parameters, Model(problem, solver), problem.offers
     lower, upper = (np.broadcast_to(bound, p.shape) for bound in (parameters.lower, parameters.upper))
-    offers = problem.offers
+    last: list[Result] = []
 
     def gradient(p: Array) -> Array:
-        returned[:] = [route.prepare(model, p, **options)(p)]
-        return returned[0].gradient
+        last[:] = [route.prepare(model, p, **options)(p)]
+        return last[0].gradient
 
-    return Subject(
+    def tighten(factor: float) -> Subject:
+        return subject(problem, route, _iterated(options, factor), p, _tighter(solver, factor))
+
+    def refine() -> Subject | None:
+        found = problem.refined(p)
+        if found is None:
+            return None
+        finer, q = found
+        if finer.n_state > LARGEST:
+            raise InputError(
+                f"{finer.n_state} unknowns on the finer mesh, {LARGEST} at most - start from a coarser one"
+            )
+        return subject(with_synthetic_data(finer), route, options, q, solver)
+
+    made = Subject(
         name=f"{route.name} on {problem.name}",
         objective=model.value,
         gradient=gradient,
@@ -49,18 +61,20 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         upper=upper,
         closed=False,
         label=parameters.label,
-        tighten=lambda factor: subject(problem, route, _more(options, factor), p, _tighter(solver, factor)),
+        tighten=tighten,
+        refine=None if type(problem).refined is Problem.refined else refine,
         active_set=_active_set(problem, solver),
-        refine=_refined(problem, route, options, p, solver),
-        exact=(lambda: exact(problem, p)) if Offers.LINEARIZE in offers else None,
-        slopes=(lambda V: complex_slopes(Model(problem, TIGHT), p, V)) if Offers.COMPLEX in offers else None,
-        explain=(lambda g: explain(model, returned[0], p, g)) if Offers.LINEARIZE in offers else None,
         accuracy=route.accuracy,
     )
+    if Offers.COMPLEX in offers:
+        made = replace(made, slopes=lambda V: complex_slopes(Model(problem, TIGHT), p, V))
+    if Offers.LINEARIZE in offers:
+        made = replace(made, exact=lambda: exact(problem, p), explain=lambda g: explain(model, last[0], p, g))
+    return made
 
 
 def _tighter(solver: Solver, factor: float) -> Solver:
-    """Tolerances times the factor, and a Newton step more: where steps square |R|, a tolerance may change nothing."""
+    """Tolerances times the factor, and one Newton step more: near the solution a tolerance alone may change nothing."""
 
     def tight(rtol: float, least: float) -> float:
         return max(min(rtol, least), rtol * factor)
@@ -69,14 +83,14 @@ def _tighter(solver: Solver, factor: float) -> Solver:
     return replace(solver, rtol=tight(solver.rtol, LEAST_RTOL), adjoint_rtol=adjoint_rtol, polish=1)
 
 
-def _more(options: Options, factor: float) -> Options:
-    """An iterate's gradient comes nearer the solution's with more iterations, not with a tolerance."""
+def _iterated(options: Options, factor: float) -> Options:
+    """More iterations for routes that differentiate iterates: no tolerance makes their gradient more accurate."""
     k = options.get("iterations")
     return options if k is None else options | {"iterations": round(k * factor**-0.3)}
 
 
 def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable] | None:
-    """Of the state at p; None where the problem has none."""
+    """p -> active set of the solved state; None where the problem has none."""
     if Offers.SOLVE not in problem.offers or type(problem).active_set is Problem.active_set:
         return None
     model = Model(problem, solver)
@@ -90,29 +104,8 @@ def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable]
     return active_set
 
 
-def _refined(
-    problem: Problem, route: Route, options: Options, p: Array, solver: Solver
-) -> Callable[[], Subject | None] | None:
-    """The route on the problem with half the mesh size. Raises InputError where that has too many unknowns."""
-    if type(problem).refined is Problem.refined:
-        return None
-
-    def refine() -> Subject | None:
-        found = problem.refined(p)
-        if found is None:
-            return None
-        finer, q = found
-        if finer.n_state > LARGEST:
-            raise InputError(
-                f"{finer.n_state} unknowns on the finer mesh, {LARGEST} at most - start from a coarser one"
-            )
-        return subject(with_synthetic_data(finer), route, options, q, solver)
-
-    return refine
-
-
 def exact(problem: Problem, p: Array) -> Array:
-    """dJ/dp by the adjoint method, solved tightly and with new factors."""
+    """dJ/dp by the adjoint method, solved to a tight tolerance with new factors."""
     model = Model(problem, TIGHT)
     state = model.solve(p, polish=1)
     lin = model.linearize(state)
@@ -121,12 +114,10 @@ def exact(problem: Problem, p: Array) -> Array:
 
 
 def explain(model: Model, result: Result, p: Array, gradient: Array) -> list[Finding]:
-    """The error budget, at the state the route returned, or at one solved for."""
+    """The factors of the gradient, tested at the state that the route returned, or at a solved one."""
     problem = model.problem
-    u: Any = result.u
     try:
-        if u is None:
-            u = model.solve(p).u
-        return [*assembly(model, result, p, gradient), *Factors(problem, np.asarray(u), p).findings()]
+        u = model.solve(p).u if result.u is None else np.asarray(result.u)
+        return [*assembly(model, result, p, gradient), *Factors(problem, u, p).findings()]
     except RoutesError as failure:
-        return [Finding("error budget", float("nan"), 0.0, str(failure))]
+        return [Finding("factors of the gradient", float("nan"), 0.0, str(failure))]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
@@ -20,14 +24,25 @@ Verdict = Literal[
 ]
 EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1}
 INCONCLUSIVE = 3
+MEANING: dict[Verdict, str] = {
+    "agrees": "the gradient and the difference quotients differ by no more than the quotients are uncertain by",
+    "wrong-gradient": "a difference that no step removes and no tighter forward solve reduces; where the solve cannot"
+    " be tightened, a difference of 1 % or more",
+    "inconsistent-discretization": "a difference that shrinks like h^k with the mesh size: the adjoint equation was"
+    " discretized on its own",
+    "solver-limited": "a difference, or noise, that falls when the forward solve is tightened",
+    "non-smooth": "one-sided quotients converge to different numbers, or active sets change between the points",
+    "noise-limited": "the noise of J leaves no usable step",
+    "undetermined": "none of these could be established; the sentence says why",
+}
 
 
 @dataclass(frozen=True)
 class Tightened:
-    """The line of the plateau again, the forward solve's tolerance times `factor`.
+    """The deciding line again, the forward solve's tolerance times `factor`.
 
-    gradient_moved, quotient_moved  by how much both sides moved from before, relative
-    moved  whether tightening has changed J(p) or the gradient in any digit
+    gradient_moved, quotient_moved  relative change of both sides
+    moved  whether J(p) or the gradient changed in any digit
     """
 
     factor: float
@@ -48,18 +63,18 @@ class Refined:
 
 @dataclass(frozen=True)
 class Check:
-    """verdict, says: why, with numbers; todo: the next thing to do.
+    """verdict; says: the reason, with numbers; todo: what to do next.
 
-    readings   every line looked at; deciding: the one the verdict rests on
-    culprit    the factor, component or functional that is wrong, where it could be told
-    not_done   what would have told more, and why it was not done
-    calls      of the objective, tightened and refined ones included; gradients likewise
+    readings   every line; deciding: the one the verdict rests on
+    culprit    the factor, component or functional that is wrong, where it is known
+    not_done   tests that were not possible, and why
+    calls      objective calls, those of tightened and refined versions included; gradients likewise
     """
 
     name: str
-    verdict: Verdict
-    says: str
-    todo: str
+    verdict: Verdict = "undetermined"
+    says: str = ""
+    todo: str = ""
     readings: tuple[Reading, ...] = ()
     deciding: Reading | None = None
     tightened: tuple[Tightened, ...] = ()
@@ -82,16 +97,19 @@ class Check:
         return f"{self.name}: {self.verdict}: {self.says} - {self.todo}"
 
     @property
-    def findings_of_factors(self) -> bool:
-        """Whether the gradient was taken apart."""
+    def convicted(self) -> Finding | None:
+        """The first finding that proves a part of the gradient wrong."""
+        return next((f for f in self.findings if f.culprit is not None), None)
+
+    @property
+    def factors_tested(self) -> bool:
+        """Whether the gradient was tested factor by factor."""
         return any(f.name.startswith("dR/dp") for f in self.findings)
 
     @property
     def plateau(self) -> float | None:
-        """Relative difference of gradient and differences that does not depend on the step."""
-        if self.deciding is None or self.deciding.says != "plateau":
-            return None
-        return self.deciding.off
+        """Relative difference of gradient and quotients, where it does not depend on the step."""
+        return self.deciding.off if self.deciding is not None and self.deciding.says == "plateau" else None
 
     @property
     def tightened_plateau(self) -> float | None:
@@ -101,24 +119,23 @@ class Check:
     def as_dict(self) -> dict[str, Any]:
         """What --json prints."""
         line = self.deciding
-        curve = None if line is None else line.central if line.sweep.two_sided else line.one_sided
         return {
             "name": self.name,
             "verdict": self.verdict,
             "says": self.says,
             "next": self.todo,
-            "floor": None if curve is None else curve.floor,
-            "best_step": None if curve is None else curve.best_step,
-            "slope_one_sided": None if line is None else line.one_sided.slope,
-            "slope_central": None if line is None else line.central.slope,
-            "roundoff_slope": None if curve is None else curve.roundoff,
-            "window": None if curve is None else curve.window,
+            "floor": line and line.curve.floor,
+            "best_step": line and line.curve.best_step,
+            "slope_one_sided": line and line.one_sided.slope,
+            "slope_central": line and line.central.slope,
+            "roundoff_slope": line and line.curve.roundoff,
+            "window": line and line.curve.window,
             "noise": self.noise,
             "plateau": self.plateau,
             "tightened_plateau": self.tightened_plateau,
-            "refined_plateau": None if self.refined is None else self.refined.after,
-            "order_in_mesh_size": None if self.refined is None else self.refined.order,
-            "active_set_changes": None if line is None else line.inside,
+            "refined_plateau": self.refined and self.refined.after,
+            "order_in_mesh_size": self.refined and self.refined.order,
+            "active_set_changes": line and line.inside,
             "culprit": self.culprit,
             "worst_components": [
                 {"name": w.name, "index": w.index, "given": w.given, "found": w.found, "factor": w.factor}
@@ -129,3 +146,32 @@ class Check:
             "gradient_calls": self.gradients,
             "remarks": [*self.not_done, *self.remarks],
         }
+
+
+def rows(check: Check, what: Row) -> dict[str, list[Row]]:
+    """Tidy rows of the tables `checks` and `points`; `what` holds problem, route and at."""
+    readings = [(1.0, r) for r in check.readings] + [(t.factor, t.reading) for t in check.tightened]
+    points = [what | point for factor, reading in readings for point in _points(factor, reading)]
+    return {"checks": [what | check.as_dict()], "points": points}
+
+
+def _points(factor: float, reading: Reading) -> Iterator[Row]:
+    """One row for every step of a line."""
+    q, scale = reading.quotients, reading.scale or 1.0
+    fixed = {
+        "line": reading.name,
+        "line_says": reading.says,
+        "tightened": factor,
+        "slope": reading.slope,
+        "scale": reading.scale,
+    }
+    with np.errstate(invalid="ignore"):
+        columns = {
+            "step": q.h,
+            "quotient_one_sided": q.forward,
+            "quotient_central": q.central,
+            "error_one_sided": np.abs(q.off_forward) / scale,
+            "error_central": np.abs(q.off_central) / scale,
+        }
+    for values in zip(*columns.values(), strict=True):
+        yield fixed | dict(zip(columns, map(float, values), strict=True))

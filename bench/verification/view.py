@@ -1,4 +1,4 @@
-"""A check for a person: the verdict, its curves, its evidence."""
+"""A check in a terminal: the verdict, its lines, its V-curve, its evidence."""
 
 from __future__ import annotations
 
@@ -14,65 +14,62 @@ from gradient_routes.bench.render.terminal.plot import Series, plot
 from gradient_routes.bench.render.terminal.tables import show
 from gradient_routes.bench.verification.contract import Contract
 from gradient_routes.bench.verification.finding import Finding
-from gradient_routes.bench.verification.lines import HEADINGS, LEGEND, rows
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
 from gradient_routes.bench.verification.result import Check
+from gradient_routes.bench.verification.table import HEADINGS, LEGEND, rows
 
-STYLES = {
-    "agrees": "bold green",
-    "wrong-gradient": "bold red",
-    "inconsistent-discretization": "bold red",
-}
+STYLES = {"agrees": "bold green", "wrong-gradient": "bold red", "inconsistent-discretization": "bold red"}
 INCONCLUSIVE = "bold yellow"
 WIDEST = 100  # columns of a plot
 MARKS = {True: "ok", False: "NO", None: "?"}
 
 
 def show_check(out: Console, check: Check, curves: bool = True) -> None:
-    """The sentence first; then what it rests on."""
-    style = STYLES.get(check.verdict, INCONCLUSIVE)
-    wrap = not out.is_terminal
-    out.print(Text.assemble((check.name, "bold"), ": ", (check.verdict, style)), soft_wrap=wrap)
-    out.print(Text(check.says), soft_wrap=wrap)
-    out.print(Text.assemble(("next: ", "bold"), check.todo), soft_wrap=wrap)
+    """The verdict first, then what it rests on."""
+
+    def line(text: Text | str, style: str = "") -> None:
+        out.print(Text(text, style=style) if isinstance(text, str) else text, soft_wrap=not out.is_terminal)
+
+    def block(table: Table, legend: str = "") -> None:
+        out.print()
+        show(out, table)
+        if legend:
+            line(legend, "dim")
+
+    line(Text.assemble((check.name, "bold"), ": ", (check.verdict, STYLES.get(check.verdict, INCONCLUSIVE))))
+    line(check.says)
+    line(Text.assemble(("next: ", "bold"), check.todo))
     if check.readings:
-        out.print()
-        show(out, lines(check))
-        out.print(Text(LEGEND, style="dim"), soft_wrap=wrap)
+        block(lines(check), LEGEND)
     if check.located is not None and check.located.worst:
-        out.print()
-        show(out, components(check.located))
+        block(components(check.located))
     if curves and check.deciding is not None:
         out.print()
         out.print(curve(check, check.deciding, min(out.width, WIDEST)))
     if check.findings:
-        out.print()
-        show(out, evidence(check.findings))
+        block(evidence(check.findings))
     if check.readings:
         out.print()
     for remark in (*check.not_done, *check.remarks):
-        out.print(Text(f"note: {remark}", style="italic"), soft_wrap=wrap)
+        line(f"note: {remark}", "italic")
     several = "" if check.gradients == 1 else "s"
-    out.print(Text(f"{check.calls} objective calls, {check.gradients} gradient{several}", style="dim"), soft_wrap=wrap)
+    line(f"{check.calls} objective calls, {check.gradients} gradient{several}", "dim")
 
 
 def lines(check: Check) -> Table:
     """One row a line: what its quotients say, in numbers."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column(HEADINGS[0], overflow="fold", min_width=18)
+    table = _table(HEADINGS[0], 18)
     for heading in HEADINGS[1:]:
-        table.add_column(heading, no_wrap=True, justify="left" if heading in ("says", "slopes") else "right")
+        table.add_column(heading, no_wrap=True, justify="left" if heading in ("result", "slopes") else "right")
     for reading, cells in rows(check):
-        style = "red" if reading.says == "plateau" else ""
-        table.add_row(*(Text(cell) for cell in cells), style=style)
+        table.add_row(*map(Text, cells), style="red" if reading.says == "plateau" else "")
     return table
 
 
 def components(located: Located) -> Table:
-    """Wrong components: what the gradient says and what differences say."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("wrong component", overflow="fold", min_width=15)
+    """Wrong components, by the gradient and by differences."""
+    table = _table("wrong component", 15)
     for heading in ("gradient", "differences", "ratio"):
         table.add_column(heading, justify="right", no_wrap=True)
     for w in located.worst:
@@ -81,35 +78,34 @@ def components(located: Located) -> Table:
 
 
 def curve(check: Check, reading: Reading, width: int) -> Text:
-    """The V-curve of one line, tightened ones beside it, and the noise that J itself predicts."""
-    made, scale = reading.sweep, reading.scale or 1.0
-    h = made.h.tolist()
+    """The V-curve of one line, those of tightened solves, and the error that the noise of J predicts."""
+    q, scale = reading.quotients, reading.scale or 1.0
+    h = q.h.tolist()
     series = [
-        Series("one-sided", h, (np.abs(made.off_forward) / scale).tolist(), "1", "#E69F00"),
-        Series("central", h, (np.abs(made.off_central) / scale).tolist(), "2", "#D55E00"),
+        Series("one-sided", h, (np.abs(q.off_forward) / scale).tolist(), "1", "#E69F00"),
+        Series("central", h, (np.abs(q.off_central) / scale).tolist(), "2", "#D55E00"),
     ]
-    for k, t in enumerate(check.tightened):
-        other = t.reading.sweep
-        errors = (np.abs(other.off_central if other.two_sided else other.off_forward) / scale).tolist()
-        series.append(Series(f"tightened x {t.factor:g}", other.h.tolist(), errors, "tuv"[k], "#0072B2"))
+    for mark, t in zip("tuv", check.tightened, strict=False):
+        other = t.reading.quotients
+        errors = (np.abs(other.off) / scale).tolist()
+        series.append(Series(f"tightened x {t.factor:g}", other.h.tolist(), errors, mark, "#0072B2"))
     if reading.noise:
-        predicted = reading.noise / (np.sqrt(2.0) * made.h) / scale
+        predicted = reading.noise / (np.sqrt(2.0) * q.h) / scale
         shown = np.where(predicted <= 1.0, predicted, np.nan)
         series.append(Series("noise of J over h", h, shown.tolist(), ".", "dim"))
-    title = f"error of quotients along {made.line.name}, relative"
+    title = f"relative error of quotients along {reading.name}"
     return Text(f"{title}\n", style="bold") + plot(series, "h", "error", width)
 
 
 def evidence(findings: Sequence[Finding]) -> Table:
-    """Evidence test by test."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("evidence", overflow="fold", min_width=20)
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("limit", justify="right", no_wrap=True)
+    """One row a test."""
+    table = _table("evidence", 20)
+    for heading in ("value", "limit"):
+        table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     table.add_column("", overflow="fold")
     for f in findings:
-        value, limit = ("", "") if f.claim else ("" if np.isnan(f.value) else number(f.value, 2), number(f.limit, 2))
+        value, limit = ("" if f.claim or np.isnan(v) else number(v, 2) for v in (f.value, f.limit))
         style = {True: "", False: "red", None: "dim"}[f.sound]
         said = "; ".join(filter(None, (f.says, None if f.claim else f.culprit)))
         table.add_row(Text(f.name), value, limit, Text(MARKS[f.sound], style=style), Text(said), style=style)
@@ -117,9 +113,15 @@ def evidence(findings: Sequence[Finding]) -> Table:
 
 
 def show_contract(out: Console, contract: Contract) -> None:
-    """All findings on a problem or route, and how many promises are broken."""
+    """All findings on a problem or route, and how many requirements are violated."""
     broken = len(contract.broken)
-    said = f"{broken} of {len(contract.findings)} promises broken" if broken else "keeps the contract"
+    said = f"{broken} of {len(contract.findings)} requirements violated" if broken else "keeps the contract"
     out.print(Text.assemble((contract.name, "bold"), ": ", (said, "bold red" if broken else "bold green")))
     out.print()
     show(out, evidence(contract.findings))
+
+
+def _table(first: str, width: int) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    table.add_column(first, overflow="fold", min_width=width)
+    return table

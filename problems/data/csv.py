@@ -1,4 +1,4 @@
-"""Reading numbers a user wrote: CSV files with a header line, errors that name the file and the line."""
+"""CSV files of numbers with a header line; errors name the file and the line."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
 
-def read_columns(path: str | Path, names: tuple[str, ...] | None, blank: tuple[str, ...] = ()) -> dict[str, Array]:
+def read_columns(path: str | Path, names: tuple[str, ...] | None, optional: tuple[str, ...] = ()) -> dict[str, Array]:
     """Read the columns `names` (all of them, where None) of a CSV file as finite float64 arrays (n_rows,).
 
-    In the columns `blank` an empty cell is NaN: not measured.
+    An empty cell in one of the columns `optional` is read as NaN.
     Raises InputError for a file that cannot be read, a missing column, text, NaN or infinity, naming the line.
     """
     try:
@@ -42,9 +42,9 @@ def read_columns(path: str | Path, names: tuple[str, ...] | None, blank: tuple[s
     places = [(header.index(name), column, name) for name, column in columns.items()]
     for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(header):
-            raise InputError(f"{path}: line {line} has {len(row)} cells, the header {len(header)} - mend the line")
+            raise InputError(f"{path}: line {line} has {len(row)} cells, the header {len(header)} - correct the line")
         for place, column, name in places:
-            empty = name in blank and not row[place].strip()
+            empty = name in optional and not row[place].strip()
             column[k] = math.nan if empty else _number(row[place], f"{path}: line {line}, column {name}")
     return columns
 

@@ -1,4 +1,4 @@
-"""What is measured, beside what the state predicts of it."""
+"""Predicted and measured data, and candidates for further sensors."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from gradient_routes.problems.problem import Array
 class Observation:
     """The data term of J: 1/2 |predicted - data|^2, with the weights of the sum in both.
 
-    predicted (m,)     S u of a state, where p moves the sensors themselves S(u, p)
-    data (m,)          what was measured
-    S_u (m, n_u)       its derivative by u, sparse
-    S_p (m, n_p)       by p with u held, None where there is none
-    sigma              standard deviation of the noise on data, 0 where none is known
+    predicted (m,)     S u, or S(u, p) if p moves the sensors
+    data (m,)          the measurements
+    S_u (m, n_u)       derivative of predicted with respect to u, sparse
+    S_p (m, n_p)       with respect to p at fixed u, None if zero
+    sigma              standard deviation of the noise on data, 0 if unknown
     label              (k) -> name of datum k
-    weight             of a reading in that sum: what the rows, the data and sigma are multiplied by
+    weight             factor contained in predicted, data, S_u and sigma
     """
 
     predicted: Array
@@ -35,11 +35,11 @@ class Observation:
 
 @dataclass(frozen=True)
 class Candidates:
-    """What a sensor could read, one unknown of the state each.
+    """Possible sensors; each reads one component of u.
 
-    at (k,)           their numbers
+    at (k,)           indices into u
     label             (j) -> name of candidate j
-    position (k, d)   where it is read [m], d <= 3; None where nowhere
+    position (k, d)   of the reading [m], d <= 3, or None
     """
 
     at: Array
@@ -48,7 +48,7 @@ class Candidates:
 
 
 def selection(at: Array, n: int, weight: float = 1.0) -> Any:
-    """The sparse matrix (m, n) that reads the components `at` (m,), times a weight."""
+    """The sparse matrix (m, n) that picks the components `at` (m,), times a weight."""
     from scipy import sparse
 
     return sparse.csr_array((np.full(len(at), weight), (np.arange(len(at)), at)), shape=(len(at), n))

@@ -9,15 +9,15 @@ import numpy as np
 
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.mesh import Body
+from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.problem import Array
 
-NEAR = 1e-3  # of the body's size: how far outside a measured point may lie, by rounding of its coordinates
+OUTSIDE_TOLERANCE = 1e-3  # of the diameter: distance outside the mesh that is attributed to rounded coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class Probes:
-    """Points of the body at which displacements are read.
+    """Points at which displacements are read.
 
     nodes (m, k), N (m, k)  a point's displacement is sum_k N_k u(node_k)
     x (m, 3)                the points [m]
@@ -27,7 +27,7 @@ class Probes:
     nodes: Array
     N: Array
     x: Array
-    seen: Array
+    measured: Array
 
     def read(self, U: Any) -> Any:
         """(m, 3) [m], from the nodes' displacements U (m, k, 3)."""
@@ -35,59 +35,59 @@ class Probes:
 
     def misfit(self, U: Any, d: Any) -> Any:
         """1/2 |S u - d|^2 over what is measured, holomorphic."""
-        return 0.5 * ((self.read(U) - d)[self.seen] ** 2).sum()
+        return 0.5 * ((self.read(U) - d)[self.measured] ** 2).sum()
 
     def misfit_gradient(self, U: Array, d: Array) -> Array:
-        """Its derivative by U, (m, k, 3)."""
-        r = np.where(self.seen, self.read(U) - d, 0.0)
+        """Derivative of the misfit with respect to U, (m, k, 3)."""
+        r = np.where(self.measured, self.read(U) - d, 0.0)
         return np.asarray(self.N[..., None] * r[:, None])
 
 
-def at_nodes(body: Body, nodes: Array) -> Probes:
+def at_nodes(mesh: Mesh, nodes: Array) -> Probes:
     return Probes(
-        nodes[:, None], np.ones((len(nodes), 1)), body.geometry.X[nodes], np.ones((len(nodes), 3), dtype=bool)
+        nodes[:, None], np.ones((len(nodes), 1)), mesh.geometry.X[nodes], np.ones((len(nodes), 3), dtype=bool)
     )
 
 
-def markers(body: Body, face: str, count: int, in_plane: bool, seed: int) -> Probes:
-    """Seeded random points on a face; `in_plane` leaves out the component nearest to its normal."""
-    facets, geometry = body.surface(face), body.geometry
+def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Probes:
+    """Random points on a face, uniform by area; `in_plane` leaves out the component closest to the normal."""
+    facets, geometry = mesh.boundary(face), mesh.geometry
     area = facets.areas(geometry.X, np).sum(axis=1)
     rng = np.random.default_rng(seed)
     chosen = rng.choice(len(area), size=count, p=area / area.sum())
     s = rng.uniform(size=(2, count))
-    if geometry.element.name != "hex8":  # fold the square onto the triangle
+    if geometry.element.name != "hex8":  # map the square to the triangle
         s = np.where(s.sum(axis=0) > 1.0, 1.0 - s, s)
     sides = facets.sides[chosen]
     xi = np.concatenate([geometry.element.on_side(int(side), s[:, [i]])[0] for i, side in enumerate(sides)], axis=1)
     N, _ = geometry.element.shape_functions(xi)
     nodes = geometry.nodes[facets.cells[chosen]]
-    seen = np.ones((count, 3), dtype=bool)
+    measured = np.ones((count, 3), dtype=bool)
     if in_plane:
         normal = facets.normals(geometry.X[facets.nodes], np).sum(axis=(0, 1))
-        seen[:, int(np.abs(normal).argmax())] = False
-    return Probes(nodes, N, np.einsum("ma,mai->mi", N, geometry.X[nodes]), seen)
+        measured[:, int(np.abs(normal).argmax())] = False
+    return Probes(nodes, N, np.einsum("ma,mai->mi", N, geometry.X[nodes]), measured)
 
 
-def measured(body: Body, path: str) -> tuple[Probes, Array]:
+def read_probes(mesh: Mesh, path: str) -> tuple[Probes, Array]:
     """Probes and data (m, 3) [m] of a file with columns x,y,z,ux,uy,uz; an empty cell was not measured.
 
     Raises InputError for points outside the body, naming the row.
     """
-    columns = read_columns(path, ("x", "y", "z", "ux", "uy", "uz"), blank=("ux", "uy", "uz"))
+    columns = read_columns(path, ("x", "y", "z", "ux", "uy", "uz"), optional=("ux", "uy", "uz"))
     x, d = (np.stack([columns[name] for name in names], axis=1) for names in (("x", "y", "z"), ("ux", "uy", "uz")))
     if not len(x) or np.isnan(d).all():
         raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
-    cells, xi, outside = body.geometry.locate(x)
-    extent = np.ptp(body.geometry.X[body.geometry.nodes[cells]], axis=1).max(axis=1)
-    bad = np.flatnonzero(outside * extent > NEAR * body.size)
+    cells, xi, outside = mesh.geometry.locate(x)
+    extent = np.ptp(mesh.geometry.X[mesh.geometry.nodes[cells]], axis=1).max(axis=1)
+    bad = np.flatnonzero(outside * extent > OUTSIDE_TOLERANCE * mesh.diameter)
     if bad.size:
-        i, (low, high) = int(bad[0]), body.box
+        i, (low, high) = int(bad[0]), mesh.bounding_box
         where, span = (", ".join(f"{value:g}" for value in values) for values in (x[i], high - low))
         raise InputError(
-            f"{path}: data row {i + 1} at ({where}) lies outside {body.who}, whose box of {span} m begins at"
+            f"{path}: data row {i + 1} at ({where}) lies outside {mesh.who}, whose box of {span} m begins at"
             f" ({', '.join(f'{v:g}' for v in low)}) ({bad.size} of {len(x)} rows do) - check coordinates and units"
         )
-    N, _ = body.geometry.element.shape_functions(xi.T)
-    seen = ~np.isnan(d)
-    return Probes(body.geometry.nodes[cells], N, x, seen), np.where(seen, d, 0.0)
+    N, _ = mesh.geometry.element.shape_functions(xi.T)
+    measured = ~np.isnan(d)
+    return Probes(mesh.geometry.nodes[cells], N, x, measured), np.where(measured, d, 0.0)

@@ -1,4 +1,4 @@
-"""alpha Phi(theta), the prior. It stands in J and nowhere else."""
+"""The regularization alpha Phi(theta), a term of J."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from gradient_routes.problems.problem import Array
 
 Phi = Literal["tikhonov", "tv", "amplitude"]
 FieldPhi = Literal["tikhonov", "tv"]
-WIDTH = 0.01  # of a jump of log E: 1 %
+PHI_WIDTH = 0.01  # jump of log E: 1 %
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """alpha Phi of theta (n,), whose differences D theta are those of neighbours.
+    """alpha Phi of theta (n,); D theta are the differences between neighbours.
 
     tikhonov   Phi = 1/2 |D theta|^2
     tv         Phi = sum of sqrt((D theta)_k^2 + width^2) - width, total variation rounded below jumps of `width`
     amplitude  Phi = 1/2 |theta - origin|^2, in units of `scale`
 
-    pairs (m, 2) numbers of neighbours; None: those on a line.
+    pairs (m, 2) of neighbours; None: consecutive components.
     """
 
     alpha: float = 0.0
     kind: Phi = "tikhonov"
-    width: float = WIDTH
+    width: float = PHI_WIDTH
     pairs: Array | None = None
     origin: Array | float = 0.0
     scale: Array | float = 1.0
@@ -57,7 +57,7 @@ class Prior:
         return 0.5 * self.alpha * xp.sum(jumps**2)
 
     def gradient(self, theta: Array) -> Array:
-        """alpha dPhi/dtheta = alpha D^T diag(weights) D theta, (n,), in the precision of theta where on a line."""
+        """alpha dPhi/dtheta = alpha D^T diag(weights) D theta, (n,), of theta's dtype if pairs is None."""
         flow = self.alpha * self.weights(theta) * self.jumps(theta)
         if self.kind == "amplitude":
             return np.asarray(flow / self.scale)
@@ -71,7 +71,7 @@ class Prior:
         return gradient
 
     def weights(self, theta: Array) -> Array:
-        """(m,) of D^T diag(weights) D: Phi'' of tikhonov; of tv what it would be with the weights standing still."""
+        """(m,) in D^T diag(weights) D: the Hessian of Phi; for tv with lagged weights (Vogel & Oman 1996)."""
         jumps = self.jumps(theta)
         return np.asarray(1.0 / np.sqrt(jumps**2 + self.width**2) if self.kind == "tv" else np.ones_like(jumps))
 

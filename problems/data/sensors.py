@@ -1,4 +1,4 @@
-"""Sensors S that read single unknowns, the data d they measured, and the misfit 1/2 |S u - d|^2."""
+"""Sensors S at nodes, their data d, and the misfit 1/2 |S u - d|^2."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Nodes = str | int | Sequence[int]
 
 @dataclass(frozen=True)
 class Sensors:
-    """nodes (m,) counted from 1, all different; d (m,) the displacement measured at each [m]."""
+    """nodes (m,), distinct, counted from 1; d (m,) the measured displacements [m]."""
 
     nodes: Array
     d: Array
 
     def misfit(self, xp: Any, u: Any) -> Any:
-        """1/2 |S u - d|^2, holomorphic in u (no absolute value), so that complex steps pass. xp: numpy or jax.numpy."""
+        """1/2 |S u - d|^2, holomorphic in u. xp: numpy or jax.numpy."""
         return 0.5 * xp.sum((u[self.nodes - 1] - self.d) ** 2)
 
     def misfit_gradient(self, u: Array) -> Array:
@@ -97,7 +97,7 @@ def _nodes_from_text(text: str, n: int, who: str) -> int | list[int]:
     return nodes
 
 
-def measured(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sensors:
+def read_sensors(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sensors:
     """Read measured data (columns `node,displacement`); `nodes` picks some of the rows, None takes all.
 
     Raises InputError for a node that does not exist, is given twice, or is asked for and not in the file.
@@ -108,7 +108,9 @@ def measured(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sensors
         raise InputError(f"{path}: has a header and no rows - add one row a sensor")
     for line, value in enumerate(node, start=2):
         if value != int(value) or not 1 <= value <= n:
-            raise InputError(f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - mend the row")
+            raise InputError(
+                f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - correct the row"
+            )
     at = {int(value): k for k, value in enumerate(node)}
     if len(at) < len(node):
         twice = next(int(v) for k, v in enumerate(node) if at[int(v)] != k)

@@ -1,9 +1,9 @@
-"""A hyperelastic solid on finite elements: its stored energy W, and everything derived from it.
+"""Internal energy, residual and tangent of a hyperelastic solid, by JAX from the stored energy W.
 
     Pi(u, q) = sum over points of W(I + grad u, q) dx,     f_int = dPi/du,     K = d^2 Pi/du^2
 
-The energy is written once, in jax.numpy. Routes that trace differentiate Pi; NumPy routes get f_int from that Pi and K
-from the moduli A = d^2 W/dF^2 at every point, contracted by BLAS: a tenth of the time XLA takes for it.
+Routes that trace differentiate Pi. For NumPy callers f_int comes from the same Pi, and K from the moduli
+A = d^2 W/dF^2 at every point, contracted by BLAS in a tenth of the time that XLA needs for it.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.mechanics.materials import Energy
 from gradient_routes.problems.problem import Array
 
-CHUNK = 128  # elements contracted at a time: their arrays stay in cache
+CELLS_PER_CHUNK = 128  # their arrays stay in cache
 
 
-class Solid:
-    """Cells of a material with the energy W(F, q).
+class JaxAssembly:
+    """Element integrals of the energy W(F, q).
 
-    Arguments everywhere: u_e (n_e, n_a, 3) displacements of the cells' nodes [m]; q a tuple of constants, numbers or
-    (n_e,); dN (n_e, n_q, n_a, 3), or (1, n_q, n_a, 3) where the cells are congruent, and dx (n_e, n_q), their metric.
+    Arguments: u_e (n_e, n_a, 3) displacements of the cells' nodes [m]; q a tuple of material constants, numbers or
+    (n_e,); dN (n_e, n_q, n_a, 3), or (1, n_q, n_a, 3) if the cells are congruent, and dx (n_e, n_q), their metric.
     """
 
     def __init__(self, W: Energy) -> None:
-        at_points = jax.vmap(W, (0, None))  # over the points of an element, which share q
+        at_points = jax.vmap(W, (0, None))  # over the points of a cell, which share q
         self._W = jax.vmap(at_points)
         self._A = jax.vmap(jax.vmap(_second_derivative(W), (0, None)))
         self._F = jax.jit(deformation_gradients)
         self._A_dx = jax.jit(self._moduli)
 
     def energy(self, u_e: Any, q: Any, dN: Any, dx: Any) -> Any:
-        """Sum of W dx; traceable, holomorphic where W is."""
+        """Sum of W dx; traceable, holomorphic if W is."""
         return (self._W(deformation_gradients(u_e, dN), _per_cell(q, dx)) * dx).sum()
 
     def _moduli(self, F: Any, q: Any, dx: Any) -> Any:
@@ -44,13 +44,13 @@ class Solid:
         A = self._A(F, _per_cell(q, dx))
         return jnp.swapaxes(A * dx[..., None, None, None, None], 2, 3)
 
-    def tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, pick: Array) -> Array:
+    def element_tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, selected: Array) -> Array:
         """Entries `pick` of the element matrices K_(ai)(bj) = sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k)."""
-        return contract(np.asarray(self._A_dx(self._F(u_e, dN), q, dx)), dN, pick)
+        return element_matrices(np.asarray(self._A_dx(self._F(u_e, dN), q, dx)), dN, selected)
 
 
 def deformation_gradients(u_e: Any, dN: Any) -> Any:
-    """F = I + grad u at every point, (n_e, n_q, 3, 3). Of congruent cells by one matrix product, in half the time."""
+    """F = I + grad u at every point, (n_e, n_q, 3, 3); one matrix product if the cells are congruent."""
     n_e, n_a, _ = u_e.shape
     if len(dN) > 1:
         return jnp.einsum("eai,eqaj->eqij", u_e, dN) + jnp.eye(3)
@@ -59,21 +59,21 @@ def deformation_gradients(u_e: Any, dN: Any) -> Any:
 
 
 def _per_cell(q: Any, dx: Any) -> Any:
-    """Constants (n_e,), whatever they were given as."""
+    """Every constant as an array (n_e,)."""
     return jax.tree.map(lambda c: jnp.broadcast_to(jnp.asarray(c), dx.shape[:1]), q)
 
 
-def contract(A_dx: Array, dN: Array, pick: Array) -> Array:
+def element_matrices(A_dx: Array, dN: Array, selected: Array) -> Array:
     """Entries `pick` (k,), counted row by row, of the matrices sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k).
 
-    A_dx (n_e, n_q, 3, 3, 3, 3) stands in the order J i j L: two matrix products then do it without transposing.
+    A_dx (n_e, n_q, 3, 3, 3, 3) has the index order J i j L: then two matrix products suffice, without transposes.
     """
     n_e, (_, n_q, n_a, _) = len(A_dx), dN.shape
-    row, column = np.divmod(pick, 3 * n_a)
-    at = (3 * row + column % 3) * n_a + column // 3  # where (ai)(bj) stands in a i j b
-    entries = np.empty((n_e, len(pick)), np.result_type(A_dx, dN))
-    for first in range(0, n_e, CHUNK):
-        chunk = slice(first, first + CHUNK)
+    row, column = np.divmod(selected, 3 * n_a)
+    at = (3 * row + column % 3) * n_a + column // 3  # position of (ai)(bj) in a i j b
+    entries = np.empty((n_e, len(selected)), np.result_type(A_dx, dN))
+    for first in range(0, n_e, CELLS_PER_CHUNK):
+        chunk = slice(first, first + CELLS_PER_CHUNK)
         G = np.ascontiguousarray((dN[chunk] if len(dN) > 1 else dN).transpose(0, 1, 3, 2))  # (chunk, n_q, 3, n_a)
         AG = A_dx[chunk].reshape(-1, n_q, 27, 3) @ G  # (chunk, n_q, J i j, b)
         K = G.reshape(-1, 3 * n_q, n_a).transpose(0, 2, 1) @ AG.reshape(-1, 3 * n_q, 9 * n_a)  # (chunk, a, i j b)
@@ -83,7 +83,7 @@ def contract(A_dx: Array, dN: Array, pick: Array) -> Array:
 
 @dataclass(frozen=True)
 class TracedJacobian:
-    """A Jacobian known by its products: forward(v) and reverse(lam), compiled."""
+    """A Jacobian by its compiled products forward(v) and reverse(lam)."""
 
     forward: Callable[[Array], Any]
     reverse: Callable[[Array], Any]
@@ -99,9 +99,9 @@ class TracedJacobian:
 class CompiledResidual:
     """R = dPi/du + g, compiled, with products of its Jacobians for NumPy callers.
 
-    Pi(u, p) is the potential of all that has one: the solid and dead loads; g(u, p) (None if there is none) the rest.
-    The Hessian of Pi is its own transpose, and its part of R_p^T w is d/dp (dPi/du . w): both take half the time of
-    a vjp of R. For g the transpose is taken in earnest.
+    Pi(u, p) is the potential of the solid and of dead loads; g(u, p) contains the loads without potential, or is None.
+    The Hessian of Pi is symmetric, and its part of R_p^T w is d/dp (dPi/du . w): both take half the time of a vjp of R.
+    Only g needs a vjp.
     """
 
     def __init__(self, Pi: Callable[[Any, Any], Any], g: Callable[[Any, Any], Any] | None = None) -> None:
@@ -128,15 +128,15 @@ class CompiledResidual:
     def __call__(self, u: Array, p: Array) -> Array:
         return np.asarray(self._R(u, p))
 
-    def by_u(self, u: Array, p: Array) -> TracedJacobian:
+    def R_u(self, u: Array, p: Array) -> TracedJacobian:
         return TracedJacobian(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_T_w(u, p, w))
 
-    def by_p(self, u: Array, p: Array) -> TracedJacobian:
+    def R_p(self, u: Array, p: Array) -> TracedJacobian:
         return TracedJacobian(lambda v: self._R_p_v(u, p, v), lambda w: self._R_p_T_w(u, p, w))
 
 
 def gradient(f: Callable[..., Any], argument: int) -> Callable[..., Any]:
-    """The derivative of a scalar function by one of its arguments, holomorphic where any of them is complex."""
+    """The derivative of a scalar function with respect to one argument, holomorphic if any argument is complex."""
 
     def derivative(*arguments: Any) -> Any:
         complex_ = any(jnp.iscomplexobj(leaf) for leaf in jax.tree.leaves(arguments))

@@ -1,4 +1,4 @@
-"""A solid's residual, tangent and R_p from hand-derived P, A and dP/dq, in NumPy: JAX takes no part."""
+"""Residual, tangent and R_p of a solid from hand-derived P, A and dP/dq in NumPy, without JAX."""
 
 from __future__ import annotations
 
@@ -9,67 +9,67 @@ import numpy as np
 from gradient_routes.problems.problem import Array
 
 if TYPE_CHECKING:
-    from gradient_routes.problems.mechanics.loaded_solid import Mechanics
+    from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 
 
-class HandSolid:
-    """What `derivatives=hand` computes with; f_int = sum over points of P dN dx."""
+class NumpyAssembly:
+    """Assembly for derivatives=hand: f_int = sum over points of P dN dx."""
 
-    def __init__(self, mechanics: Mechanics) -> None:
-        assert mechanics.law.hand is not None, "the block refuses laws without"
-        self.mechanics, self.hand = mechanics, mechanics.law.hand
-        self.nodes = mechanics.body.geometry.nodes
+    def __init__(self, solid: LoadedSolid) -> None:
+        assert solid.law.numpy is not None, "Block refuses laws without NumPy derivatives"
+        self.solid, self.material = solid, solid.law.numpy
+        self.nodes = solid.mesh.geometry.nodes
 
     def residual(self, u: Array, p: Array) -> Array:
         """f_int - f_ext, (n_u,)."""
-        m = self.mechanics
-        s = m.setting(p)
-        dN, dx = m.metric(s, np)
+        solid = self.solid
+        s = solid.setup(p)
+        dN, dx = solid.metric(s, np)
         parts = []
-        for case in range(len(m.directions)):
-            F = self._F(m.displacements(u, s, case, self.nodes), dN)
-            f_e = _forces(self.hand.P(F, _per_point(s.q, F)), dN, dx)
-            f, _ = m.supports.gather(f_e, self.nodes, case)
-            external = m.external_forces(u, s, case)
-            parts.append(f if external is None else f - m.supports.gather(external, m.loaded.nodes, case)[0])
+        for case in range(len(solid.directions)):
+            F = self._F(solid.displacements(u, s, case, self.nodes), dN)
+            f_e = _element_forces(self.material.P(F, _per_point(s.q, F)), dN, dx)
+            f, _ = solid.bc.assemble(f_e, self.nodes, case)
+            external = solid.external_forces(u, s, case)
+            parts.append(f if external is None else f - solid.bc.assemble(external, solid.loaded.nodes, case)[0])
         return np.concatenate(parts)
 
-    def tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, pick: Array) -> Array:
+    def element_tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, selected: Array) -> Array:
         """Entries `pick` of the element matrices: see Solid.tangents."""
-        from gradient_routes.problems.fem.assembly_jax import contract
+        from gradient_routes.problems.fem.assembly_jax import element_matrices
 
         F = self._F(u_e, dN)
-        A = self.hand.A(F, _per_point(q, F)) * dx[..., None, None, None, None]
-        return contract(A.swapaxes(2, 3), dN, pick)
+        A = self.material.A(F, _per_point(q, F)) * dx[..., None, None, None, None]
+        return element_matrices(A.swapaxes(2, 3), dN, selected)
 
-    def by_p(self, u: Array, p: Array) -> Any:
-        """R_p (n_u, n_p), a sparse matrix: every cell depends on one parameter through each constant."""
+    def R_p(self, u: Array, p: Array) -> Any:
+        """R_p (n_u, n_p), sparse: each material constant of a cell depends on one parameter."""
         from scipy.sparse import coo_array
 
-        m, derivative = self.mechanics, self.mechanics.unknown.q_p
-        assert derivative is not None, "the block refuses other unknowns"
-        s = m.setting(p)
-        dN, dx = m.metric(s, np)
+        solid, derivative = self.solid, self.solid.design.q_p
+        assert derivative is not None, "Block refuses p that is not a material"
+        s = solid.setup(p)
+        dN, dx = solid.metric(s, np)
         rows, columns, entries = [], [], []
-        for case in range(len(m.directions)):
-            F = self._F(m.displacements(u, s, case, self.nodes), dN)
-            unknowns = m.supports.unknowns(self.nodes, case)
-            free = unknowns >= 0
-            for P_q, (q_p, column) in zip(self.hand.P_q(F, _per_point(s.q, F)), derivative(p), strict=True):
-                f_e = _forces(P_q, dN, dx).reshape(unknowns.shape) * q_p[:, None]
-                rows.append(case * m.supports.n_free + unknowns[free])
-                columns.append(np.broadcast_to(column[:, None], unknowns.shape)[free])
+        for case in range(len(solid.directions)):
+            F = self._F(solid.displacements(u, s, case, self.nodes), dN)
+            dofs = solid.bc.dofs(self.nodes, case)
+            free = dofs >= 0
+            for P_q, (q_p, column) in zip(self.material.P_q(F, _per_point(s.q, F)), derivative(p), strict=True):
+                f_e = _element_forces(P_q, dN, dx).reshape(dofs.shape) * q_p[:, None]
+                rows.append(case * solid.bc.n_free + dofs[free])
+                columns.append(np.broadcast_to(column[:, None], dofs.shape)[free])
                 entries.append(f_e[free])
         ijv = (np.concatenate(part) for part in (entries, rows, columns))
         data, i, j = ijv
-        return coo_array((data, (i, j)), shape=(m.supports.n_u, len(p))).tocsr()
+        return coo_array((data, (i, j)), shape=(solid.bc.n_u, len(p))).tocsr()
 
     @staticmethod
     def _F(u_e: Array, dN: Array) -> Array:
         return np.asarray(np.swapaxes(u_e, 1, 2)[:, None] @ dN + np.eye(3))
 
 
-def _forces(P: Array, dN: Array, dx: Array) -> Array:
+def _element_forces(P: Array, dN: Array, dx: Array) -> Array:
     """Sum over points of P_iJ dN_a,J dx, (n_e, n_a, 3)."""
     _, n_q, n_a, _ = dN.shape
     P_dx = (P * dx[..., None, None]).transpose(0, 1, 3, 2).reshape(len(P), n_q * 3, 3)
@@ -77,5 +77,5 @@ def _forces(P: Array, dN: Array, dx: Array) -> Array:
 
 
 def _per_point(q: Any, F: Array) -> tuple[Array, ...]:
-    """Constants (n_e, 1): they broadcast over a cell's points."""
+    """Constants (n_e, 1), to broadcast over the points of a cell."""
     return tuple(np.broadcast_to(c, len(F))[:, None] for c in q)

@@ -1,4 +1,4 @@
-"""Which displacement components are unknown, which are held at zero, and which a grip moves by an amplitude."""
+"""Dirichlet conditions: displacement components that are free, clamped at zero, or prescribed by a grip."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.mesh import Body
+from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.problem import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Supports:
-    """Load cases of one body, each with a state of its own; u holds their unknowns one case after the other.
+class BoundaryConditions:
+    """Degrees of freedom in one or more load cases; u concatenates those of all cases.
 
-    n_free                         unknowns of a case
-    index (cases, n_nodes, 3)      where a nodal displacement stands in (u_case, 0, a), a the grip's amplitude [m]
-    clamped, gripped               numbers of the nodes held and of those moved
+    n_free                         degrees of freedom of one case
+    index (cases, n_nodes, 3)      position of a nodal displacement in (u_case, 0, a), a the grip displacement [m]
+    clamped, gripped               node numbers
     """
 
     n_free: int
@@ -27,15 +27,15 @@ class Supports:
     gripped: Array
 
     @classmethod
-    def of(cls, body: Body, clamped: Array, gripped: Array, directions: Array) -> Supports:
-        """Nodes held, nodes moved by the grip, and the direction (cases, 3) they are moved in."""
-        X = body.geometry.X
+    def of(cls, mesh: Mesh, clamped: Array, gripped: Array, directions: Array) -> BoundaryConditions:
+        """From node numbers and the directions (cases, 3) the grip moves in. Raises InputError if no node is free."""
+        X = mesh.geometry.X
         free = np.zeros(len(X), dtype=bool)
-        free[np.unique(body.geometry.nodes)] = True  # a file may hold nodes of no cell
+        free[np.unique(mesh.geometry.nodes)] = True  # a mesh file may contain nodes of no cell
         free[clamped] = free[gripped] = False
         n_free = 3 * int(free.sum())
         if n_free == 0:
-            raise InputError(f"{body.who}: no node is free to move - refine the mesh or clamp less")
+            raise InputError(f"{mesh.who}: no node is free to move - refine the mesh or clamp less")
         index = np.full((len(X), 3), n_free)
         index[free] = np.arange(n_free).reshape(-1, 3)
         cases = np.repeat(index[None], len(directions), axis=0)
@@ -48,17 +48,17 @@ class Supports:
         return self.n_free * len(self.index)
 
     def displacements(self, u: Any, a: Any, case: int, nodes: Array, xp: Any) -> Any:
-        """Of the nodes (..., 3) in a load case, from all unknowns u (n_u,)."""
+        """Displacements (..., 3) of nodes in a load case, from u (n_u,) and the grip displacement a."""
         u_case = u[case * self.n_free : (case + 1) * self.n_free]
         return xp.concatenate([u_case, xp.stack([0.0 * a, a])])[self.index[case][nodes]]
 
-    def unknowns(self, nodes: Array, case: int = 0) -> Array:
-        """(n_e, 3 n_a), numbers within a case of the cells' unknowns, -1 where constrained: alike in all cases."""
+    def dofs(self, nodes: Array, case: int = 0) -> Array:
+        """(n_e, 3 n_a), degrees of freedom of the cells within a case, -1 where constrained; the same in all cases."""
         index = self.index[case][nodes].reshape(len(nodes), -1)
         return np.where(index < self.n_free, index, -1)
 
-    def rigid_motions(self, X: Array) -> Array:
-        """(n_free, 6), translations along and linearized rotations about the three axes, of the nodes at X."""
+    def rigid_body_modes(self, X: Array) -> Array:
+        """(n_free, 6), translations along and linearized rotations about the three axes, of nodes at X."""
         e, r = np.eye(3), X - X.mean(axis=0)
         motions = [np.broadcast_to(e[i], r.shape) for i in range(3)] + [np.cross(e[i], r) for i in range(3)]
         free = self.index[0] < self.n_free
@@ -66,8 +66,8 @@ class Supports:
         rigid[self.index[0][free]] = np.stack(motions, axis=-1)[free]
         return rigid
 
-    def gather(self, forces: Array, nodes: Array, case: int) -> tuple[Array, Any]:
-        """The transpose of `displacements`: forces (..., 3) summed into (n_free,), and the part that falls to a."""
+    def assemble(self, forces: Array, nodes: Array, case: int) -> tuple[Array, Any]:
+        """The transpose of `displacements`: nodal forces (..., 3) summed into (n_free,), and their part on a."""
         at, n = self.index[case][nodes].ravel(), self.n_free + 2
         flat = forces.ravel()
         total = np.bincount(at, weights=flat.real, minlength=n)
@@ -76,15 +76,15 @@ class Supports:
         return total[: self.n_free], total[-1]
 
 
-def check_clamp(body: Body, clamped: Array) -> None:
-    """Raises InputError where rigid motions are left, of the body or of a part that hangs together with no other."""
-    parts = body.geometry.parts
+def check_clamp(mesh: Mesh, clamped: Array) -> None:
+    """Raises InputError if a connected part of the mesh keeps rigid-body modes: its clamped nodes lie on a line."""
+    parts = mesh.geometry.parts
     for part in range(parts.max() + 1):
         held = clamped[parts[clamped] == part]
-        X = body.geometry.X[held]
+        X = mesh.geometry.X[held]
         spread = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) if len(X) else np.zeros(3)
-        if (spread > 1e-9 * body.size).sum() < 2:
+        if (spread > 1e-9 * mesh.diameter).sum() < 2:
             what = "the body" if parts.max() == 0 else f"part {part + 1} of {parts.max() + 1} that share no node"
             raise InputError(
-                f"{body.who}: {len(held)} clamped nodes leave {what} free to turn: R_u is singular - clamp a face of it"
+                f"{mesh.who}: {len(held)} clamped nodes leave {what} free to turn: R_u is singular - clamp a face"
             )

@@ -1,8 +1,8 @@
-"""Finite elements on curved or straight cells, isoparametric: scikit-fem's shape functions, our own metric.
+"""Isoparametric finite elements with the shape functions of scikit-fem.
 
     x = sum_a N_a(xi) X_a,     J = dx/dxi,     dN_a/dx = J^-T dN_a/dxi,     n dA = cof(J) n_ref dA_ref  (Nanson)
 
-Everything is a function of the nodes' positions X, so that a shape may be differentiated; xp is numpy or jax.numpy.
+All metric quantities are functions of the nodal positions X and can be differentiated. xp: numpy or jax.numpy.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from gradient_routes.problems.problem import Array
 
 ElementName = Literal["hex8", "tet4", "tet10"]
 QUADRATURE = {"hex8": (2, 2), "tet4": (1, 2), "tet10": (2, 4)}  # polynomial orders inside and on facets
-SETTLED = 1e-12  # of reference coordinates: a Newton step after one so small is rounding
-CONGRUENT = 1e-13  # relative deviation of shape functions' gradients: positions are rounded
-# meshio's name and order of nodes, for cells whose det J is positive and negative in scikit-fem's order
+NEWTON_TOLERANCE = 1e-12  # of a Newton step in reference coordinates
+CONGRUENCE_TOLERANCE = 1e-13  # relative difference of shape function gradients that is attributed to rounding
+# meshio's name and node order, for cells with det J > 0 and det J < 0 in scikit-fem's order
 MESHIO = {
     "hex8": ("hexahedron", [0, 2, 6, 3, 1, 4, 7, 5], [0, 3, 6, 2, 1, 5, 7, 4]),
     "tet4": ("tetra", [0, 1, 2, 3], [1, 0, 2, 3]),
@@ -36,7 +36,7 @@ def cofactors(J: Any, xp: Any) -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class Element:
-    """A reference element by name, its shape functions those of scikit-fem."""
+    """A reference element by name."""
 
     name: ElementName
 
@@ -48,7 +48,7 @@ class Element:
 
     @cached_property
     def facet_basis(self) -> Any:
-        """Of the first order, on the reference facet: it maps that facet to the element's sides."""
+        """First-order shape functions on the reference facet, which map it to the sides of the element."""
         import skfem
 
         return skfem.ElementQuad1() if self.name == "hex8" else skfem.ElementTriP1()
@@ -69,7 +69,7 @@ class Element:
         return np.asarray(xi), np.asarray(w)
 
     def outside(self, xi: Array) -> Array:
-        """How far xi (..., 3) lies outside the reference element (...,); negative inside."""
+        """Distance (...,) of xi (..., 3) outside the reference element, in reference coordinates; negative inside."""
         below = -xi.min(axis=-1)
         return np.asarray(np.maximum(below, xi.max(axis=-1) - 1.0 if self.name == "hex8" else xi.sum(axis=-1) - 1.0))
 
@@ -95,7 +95,7 @@ class Element:
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Cells of one kind: nodes (n_e, n_a) of every cell, positions X (n_nodes, 3) of the nodes [m]."""
+    """Cells of one element type: nodes (n_e, n_a) of every cell, nodal positions X (n_nodes, 3) [m]."""
 
     element: Element
     nodes: Array
@@ -108,7 +108,7 @@ class Geometry:
 
     @cached_property
     def orientation(self) -> Array:
-        """(n_e, 1), the sign of det J: cells may be numbered either way round."""
+        """(n_e, 1), the sign of det J, which depends on the numbering of the nodes."""
         return np.asarray(np.sign(self._volumes(self.X, np)[2][:, :1]))
 
     def _volumes(self, X: Any, xp: Any) -> tuple[Any, Any, Any]:
@@ -117,7 +117,7 @@ class Geometry:
         return cof, det, w * det
 
     def determinants(self) -> Array:
-        """det J (n_e, n_a) at the cells' own nodes."""
+        """det J (n_e, n_a) at the nodes of the cells."""
         _, dN = self.element.shape_functions(self.element.basis.doflocs.T)
         return np.asarray(cofactors(np.einsum("eai,qaj->eqij", self.X[self.nodes], dN), np)[1])
 
@@ -129,9 +129,9 @@ class Geometry:
 
     @cached_property
     def metric(self) -> tuple[Array, Array]:
-        """dN, dx of the nodes as they are; dN (1, n_q, n_a, 3) where all cells are congruent but for rounding."""
+        """dN, dx at X; dN (1, n_q, n_a, 3) if all cells are congruent up to rounding."""
         dN, dx = self.at(self.X, np)
-        congruent = np.abs(dN - dN[:1]).max() <= CONGRUENT * np.abs(dN).max()
+        congruent = np.abs(dN - dN[:1]).max() <= CONGRUENCE_TOLERANCE * np.abs(dN).max()
         return (dN[:1] if congruent else dN), dx
 
     @cached_property
@@ -141,7 +141,7 @@ class Geometry:
 
     @cached_property
     def parts(self) -> Array:
-        """(n_nodes,), the number of the part each node hangs together with; -1 for nodes of no cell."""
+        """(n_nodes,), the connected component of each node; -1 for nodes of no cell."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -154,15 +154,15 @@ class Geometry:
         return parts
 
     def for_meshio(self) -> tuple[str, Array]:
-        """meshio's name of the cells and their nodes (n_e, n_a) in its order, all the right way round."""
+        """meshio's name of the cell type and the nodes (n_e, n_a) in its order, with positive orientation."""
         name, positive, negative = MESHIO[self.element.name]
         return name, np.where(self.orientation > 0, self.nodes[:, positive], self.nodes[:, negative])
 
     def locate(self, x: Array) -> tuple[Array, Array, Array]:
-        """The cell (m,) and the reference point (m, 3) of points x (m, 3), and how far outside it lies (m,)."""
+        """Cell (m,) and reference coordinates (m, 3) of points x (m, 3), and their distance outside the cell (m,)."""
         X = self.X[self.nodes]
         low, high = X.min(axis=1), X.max(axis=1)
-        margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # curved sides bulge
+        margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may be curved
         found = [
             self._locate(x_i, X, np.flatnonzero(((low - margin <= x_i) & (x_i <= high + margin)).all(axis=1)))
             for x_i in x
@@ -171,8 +171,8 @@ class Geometry:
         return np.array(cells), np.array(xi), np.array(outside)
 
     def _locate(self, x: Array, X: Array, cells: Array) -> tuple[int, Array, float]:
-        """The same of one point among `cells`, by Newton's method for x = sum_a N_a(xi) X_a in each."""
-        if not cells.size:  # far outside: by how much is told by the nearest
+        """The same for one point among candidate cells, by Newton's method for x = sum_a N_a(xi) X_a."""
+        if not cells.size:  # outside the mesh: measure the distance to the nearest cell
             cells = np.array([np.linalg.norm(self.centres - x, axis=1).argmin()])
         X, xi = X[cells], np.full((len(cells), 3), 0.25)
         for _ in range(20):
@@ -180,10 +180,9 @@ class Geometry:
             r = np.einsum("ka,kai->ki", N, X) - x
             cof, det = cofactors(np.einsum("kai,kaj->kij", X, dN), np)
             before = xi
-            xi = np.clip(
-                xi - np.einsum("kij,ki->kj", cof, r) / det[:, None], -4.0, 5.0
-            )  # far outside, the map may fold
-            if np.abs(xi - before).max() <= SETTLED:  # after two steps where all maps are affine
+            # clipped, as the map may fold far outside the cell
+            xi = np.clip(xi - np.einsum("kij,ki->kj", cof, r) / det[:, None], -4.0, 5.0)
+            if np.abs(xi - before).max() <= NEWTON_TOLERANCE:  # after two steps if all maps are affine
                 break
         reached = np.abs(r).max(axis=1) <= 1e-9 * np.ptp(X, axis=1).max(axis=1)
         outside = np.where(reached, self.element.outside(xi), np.inf)
@@ -193,9 +192,9 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Sides of cells with quadrature points on them.
+    """Sides of cells, with quadrature points.
 
-    cells, sides (n_f,)   the cell each belongs to, and which of its sides it is
+    cells, sides (n_f,)   the cell of each facet, and the number of the side
     N (n_f, n_q, n_a)     shape functions of that cell at the points, dN (n_f, n_q, n_a, 3) by reference coordinates
     n_ref (n_f, n_q, 3)   outward normal of the reference side times its weight
     """
@@ -222,16 +221,16 @@ class Facets:
 
     @property
     def nodes(self) -> Array:
-        """(n_f, n_a), nodes of the cells they belong to."""
+        """(n_f, n_a), nodes of the facets' cells."""
         return np.asarray(self.geometry.nodes[self.cells])
 
     @cached_property
     def node_set(self) -> Array:
-        """Numbers of the nodes that lie on them."""
+        """The nodes on the facets."""
         return np.unique(self.nodes[(np.abs(self.N) > 1e-9).any(axis=1)])
 
     def normals(self, x: Any, xp: Any) -> Any:
-        """n dA (n_f, n_q, 3) [m^2], outward, for the nodes (n_f, n_a, 3) of their cells at x, deformed or not."""
+        """Outward n dA (n_f, n_q, 3) [m^2] for nodes of the facets' cells at x (n_f, n_a, 3), deformed or not."""
         cof, _ = cofactors(xp.einsum("fai,fqaj->fqij", x, self.dN), xp)
         orientation = self.geometry.orientation[self.cells][..., None]
         return xp.einsum("fqij,fqj->fqi", cof, self.n_ref) * orientation

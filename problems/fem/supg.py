@@ -3,7 +3,7 @@
     b . grad u - div(kappa grad u) = f        u = 0 where b . n < 0,  kappa du/dn = 0 elsewhere
     (grad v, kappa grad u) + (v, b . grad u - f) + sum over cells of tau (b . grad v, b . grad u - f) = 0
 
-Nothing is missing behind tau: on squares div grad u of a bilinear u is 0, and kappa is constant in a cell.
+The stabilization is consistent: in a square cell div(kappa grad u) of a bilinear u is 0 for constant kappa.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ import numpy as np
 from gradient_routes.problems.matrices.sparse import GeneralPattern, GeneralSparse
 from gradient_routes.problems.problem import Array
 
-TANGENTIAL = 1e-12  # |b . n| / |b| of a flow along a side: sin(pi) is not 0
+TANGENTIAL = 1e-12  # |b . n| / |b| below which the flow is along a side: sin(pi) is not 0 in float64
 
 
 @dataclass(frozen=True, eq=False)
 class Supg:
-    """The discretization on n x n cells of the unit square: all are congruent, so one matrix a term does for all.
+    """The discretization on n x n cells of the unit square; the cells are congruent and share their element matrices.
 
-    mesh, free (n_u,)  scikit-fem's mesh, and the numbers of its nodes that carry the unknowns
+    mesh, free (n_u,)  scikit-fem's mesh, and its nodes that carry degrees of freedom
     b (2,)             the flow, |b| = 1 m/s
-    length             of a cell along b [m]
+    h                  length of a cell along b [m]
     D, C, S (4, 4)     of (grad v, grad u), (v, b . grad u), (b . grad v, b . grad u)
     m, s (4,)          of (v, 1), (b . grad v, 1)
-    unknowns (n_e, 4)  the free unknowns at the cells' corners, -1 at the inflow
-    entries (n_u, 4)   where they stand among the cells' corners, counted through; -1 where fewer than 4 cells meet
+    dofs (n_e, 4)      degrees of freedom at the cells' corners, -1 at the inflow
+    entries (n_u, 4)   flat indices of each degree of freedom in dofs; -1 if fewer than 4 cells meet
     """
 
     mesh: Any
     free: Array
     b: Array
-    length: float
+    h: float
     D: Array
     C: Array
     S: Array
     m: Array
     s: Array
-    unknowns: Array
+    dofs: Array
     entries: Array
     pattern: GeneralPattern
 
@@ -63,44 +63,46 @@ class Supg:
             lambda u, v, _: along(v) * along(u),
         )
         linear = (lambda v, _: 1.0 * v, lambda v, _: along(v))
-        D, C, S = (BilinearForm(form).elemental(cell).tolocal()[0].T for form in bilinear)  # it has columns first
+        D, C, S = (
+            BilinearForm(form).elemental(cell).tolocal()[0].T for form in bilinear
+        )  # scikit-fem stores columns first
         m, s = (LinearForm(form).elemental(cell).tolocal()[0] for form in linear)
-        free = ~inflow(mesh.p.T, b)
-        unknowns = np.where(free, np.cumsum(free) - 1, -1)[mesh.t.T]
+        free = ~on_inflow(mesh.p.T, b)
+        dofs = np.where(free, np.cumsum(free) - 1, -1)[mesh.t.T]
         n_u = int(free.sum())
         return cls(
             mesh=mesh,
             free=np.flatnonzero(free),
             b=b,
-            length=1.0 / (n * float(np.abs(b).max())),
+            h=1.0 / (n * float(np.abs(b).max())),
             D=D, C=C, S=S, m=m, s=s,
-            unknowns=unknowns,
-            entries=_entries(unknowns, n_u),
-            pattern=GeneralPattern.of_elements(unknowns, n_u),
+            dofs=dofs,
+            entries=_entries(dofs, n_u),
+            pattern=GeneralPattern.of_elements(dofs, n_u),
         )  # fmt: skip
 
     @property
     def x(self) -> Array:
-        """Where the unknowns sit, (n_u, 2) [m]."""
+        """Positions (n_u, 2) [m] of the degrees of freedom."""
         return np.asarray(self.mesh.p.T[self.free])
 
     @property
     def centres(self) -> Array:
-        """(n_e, 2) [m]."""
+        """Cell centres (n_e, 2) [m]."""
         return np.asarray(self.mesh.p.T[self.mesh.t.T].mean(axis=1))
 
     def tau(self, kappa: Any) -> Any:
-        """[s], from advection to diffusion without a corner (Shakib, Hughes & Johan 1991): h/2 or h^2 / (12 kappa)."""
-        h = self.length
+        """tau [s], with the limits h/2 and h^2 / (12 kappa) (Shakib, Hughes & Johan 1991)."""
+        h = self.h
         return ((2.0 / h) ** 2 + 9.0 * (4.0 * kappa / h**2) ** 2) ** -0.5
 
     def tau_kappa(self, kappa: Any) -> Any:
         """dtau/dkappa."""
-        return -144.0 * kappa / self.length**4 * self.tau(kappa) ** 3
+        return -144.0 * kappa / self.h**4 * self.tau(kappa) ** 3
 
     def at_corners(self, u: Any, xp: Any = np) -> Any:
         """u (n_u,) at the corners of every cell, (n_e, 4)."""
-        return xp.append(u, 0.0)[self.unknowns]
+        return xp.append(u, 0.0)[self.dofs]
 
     def residual(self, u: Any, kappa: Any, f: Any, xp: Any = np) -> Any:
         """R (n_u,), for kappa (n_e,) [m^2/s] and f (n_e,) [K/s] constant in every cell."""
@@ -117,29 +119,29 @@ class Supg:
     def tangent(self, kappa: Array) -> GeneralSparse:
         return self.pattern.assemble(self.cell_matrices(kappa))
 
-    def by_kappa(self, u: Array, kappa: Array, f: Array) -> Array:
-        """dR_e/dkappa_e (n_e, 4), tau's own derivative included."""
+    def dR_dkappa(self, u: Array, kappa: Array, f: Array) -> Array:
+        """dR_e/dkappa_e (n_e, 4), including dtau/dkappa."""
         U = self.at_corners(u)
         return np.asarray(U @ self.D.T + self.tau_kappa(kappa)[:, None] * (U @ self.S.T - f[:, None] * self.s))
 
-    def by_f(self, kappa: Array) -> Array:
+    def dR_df(self, kappa: Array) -> Array:
         """dR_e/df_e (n_e, 4)."""
         return np.asarray(-self.m - self.tau(kappa)[:, None] * self.s)
 
-    def columns(self, by_cell: Array) -> Any:
-        """The sparse (n_u, n_e) matrix whose column e holds by_cell[e], (n_e, 4), in the rows of cell e's unknowns."""
+    def cellwise_columns(self, by_cell: Array) -> Any:
+        """The sparse (n_u, n_e) matrix with by_cell[e] (4,) in column e, in the rows dofs[e]."""
         from scipy.sparse import csr_array
 
-        e, a = np.nonzero(self.unknowns >= 0)
-        shape = self.pattern.n, len(self.unknowns)
-        return csr_array((by_cell[e, a], (self.unknowns[e, a], e)), shape=shape)
+        e, a = np.nonzero(self.dofs >= 0)
+        shape = self.pattern.n, len(self.dofs)
+        return csr_array((by_cell[e, a], (self.dofs[e, a], e)), shape=shape)
 
     def mass(self, of_outflow: bool) -> Any:
-        """The consistent mass matrix (n_u, n_u) of the square, or of the sides the flow leaves by."""
+        """The consistent mass matrix (n_u, n_u) of the square or of the outflow boundary."""
         from skfem import Basis, BilinearForm, ElementQuad1, FacetBasis
 
         if of_outflow:
-            facets = self.mesh.facets_satisfying(lambda x: inflow(x.T, -self.b), boundaries_only=True)
+            facets = self.mesh.facets_satisfying(lambda x: on_inflow(x.T, -self.b), boundaries_only=True)
             basis = FacetBasis(self.mesh, ElementQuad1(), facets=facets)
         else:
             basis = Basis(self.mesh, ElementQuad1())
@@ -147,24 +149,24 @@ class Supg:
 
     @property
     def neighbours(self) -> Array:
-        """Pairs of cells with a side in common, (n_s, 2)."""
+        """Pairs of cells that share a side, (n_s, 2)."""
         return np.asarray(self.mesh.f2t.T[self.mesh.f2t[1] >= 0])
 
 
-def inflow(x: Array, b: Array) -> Array:
-    """Which points x (..., 2) of the closed unit square lie on a side that b enters by."""
+def on_inflow(x: Array, b: Array) -> Array:
+    """Whether points x (..., 2) of the closed unit square lie on the inflow boundary of b."""
     low, high = x == 0.0, x == 1.0
     return np.asarray(((low & (b > TANGENTIAL)) | (high & (b < -TANGENTIAL))).any(axis=-1))
 
 
-def direction(angle: float) -> Array:
+def unit_vector(angle: float) -> Array:
     """The unit vector at an angle [degrees] to the x axis."""
     return np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
 
 
-def _entries(unknowns: Array, n_u: int) -> Array:
-    """The inverse of `unknowns`: at most four cells meet in a node."""
-    flat = unknowns.ravel()
+def _entries(dofs: Array, n_u: int) -> Array:
+    """The inverse of `dofs`: at most four cells meet in a node."""
+    flat = dofs.ravel()
     order = np.argsort(flat, kind="stable")
     order = order[flat[order] >= 0]
     node = flat[order]

@@ -1,4 +1,4 @@
-"""Sparse matrices with a fixed pattern, assembled by adding element entries into slots found once."""
+"""Sparse matrices with a fixed pattern: element matrices are added into precomputed slots."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from gradient_routes.problems.problem import Array
 
 @dataclass(frozen=True, eq=False)
 class SymmetricPattern:
-    """Where the upper triangle of a symmetric (n, n) matrix has entries, in CSR form with sorted columns.
+    """Sparsity pattern of the upper triangle of a symmetric (n, n) matrix, in CSR form with sorted columns.
 
-    slots (n_e, m (m + 1) / 2) sends the upper triangle of every (m, m) element matrix, row by row, to its entry;
-    entries of constrained unknowns go to slot nnz, which is dropped. near_kernel (n, k), the rigid motions say, is what
-    the matrix nearly maps to zero: multigrid wants to know.
+    slots (n_e, m (m + 1) / 2) maps the upper triangle of every (m, m) element matrix, row by row, to its entry; entries
+    of constrained degrees of freedom go to slot nnz, which is dropped. near_nullspace (n, k), such as the rigid-body
+    modes, is used by multigrid.
     """
 
     n: int
     indptr: Array
     indices: Array
     slots: Array
-    near_kernel: Array | None = None
+    near_nullspace: Array | None = None
 
     @classmethod
-    def of_elements(cls, unknowns: Array, n: int, near_kernel: Array | None = None) -> SymmetricPattern:
-        """From unknowns (n_e, m), the numbers 0..n-1 of every element's unknowns, -1 where constrained."""
-        i, j = np.triu_indices(unknowns.shape[1])
-        a, b = unknowns[:, i].astype(np.int64), unknowns[:, j].astype(np.int64)
+    def of_elements(cls, dofs: Array, n: int, near_nullspace: Array | None = None) -> SymmetricPattern:
+        """From dofs (n_e, m), the degrees of freedom 0..n-1 of every element, -1 where constrained."""
+        i, j = np.triu_indices(dofs.shape[1])
+        a, b = dofs[:, i].astype(np.int64), dofs[:, j].astype(np.int64)
         free = (a >= 0) & (b >= 0)
-        return cls(n, *_slots(np.minimum(a, b), np.maximum(a, b), free, n), near_kernel)
+        return cls(n, *_slots(np.minimum(a, b), np.maximum(a, b), free, n), near_nullspace)
 
     def assemble(self, entries: Array) -> SymmetricSparse:
         """Sum entries (n_e, m (m + 1) / 2), the upper triangles of the element matrices, into a matrix."""
-        return SymmetricSparse(self, _summed(self.slots, entries.ravel(), len(self.indices)))
+        return SymmetricSparse(self, _accumulate(self.slots, entries.ravel(), len(self.indices)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,14 +56,14 @@ class SymmetricSparse:
 
     @cached_property
     def upper(self) -> Any:
-        """The upper triangle as a SciPy CSR array that shares this one's memory."""
+        """The upper triangle as a SciPy CSR array that shares `data`."""
         from scipy.sparse import csr_array
 
         return csr_array((self.data, self.pattern.indices, self.pattern.indptr), shape=self.shape)
 
     @cached_property
     def diagonal(self) -> Array:
-        """Its diagonal (n,): first in every sorted row of the upper triangle."""
+        """The diagonal (n,): the first entry in every row of the upper triangle."""
         return np.asarray(self.data[self.pattern.indptr[:-1]])
 
     def full(self) -> Any:
@@ -88,10 +88,10 @@ class SymmetricSparse:
 
 @dataclass(frozen=True, eq=False)
 class GeneralPattern:
-    """Where an (n, n) matrix has entries, in CSR form with sorted columns.
+    """Sparsity pattern of an (n, n) matrix, in CSR form with sorted columns.
 
-    slots (n_e, m, m) sends every entry of the element matrices to its own; those of constrained unknowns go to slot
-    nnz, which is dropped.
+    slots (n_e, m, m) maps every entry of the element matrices to its entry; those of constrained degrees of freedom go
+    to slot nnz, which is dropped.
     """
 
     n: int
@@ -100,19 +100,19 @@ class GeneralPattern:
     slots: Array
 
     @classmethod
-    def of_elements(cls, unknowns: Array, n: int) -> GeneralPattern:
-        """From unknowns (n_e, m), the numbers 0..n-1 of every element's unknowns, -1 where constrained."""
-        a, b = (x.astype(np.int64) for x in np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :]))
+    def of_elements(cls, dofs: Array, n: int) -> GeneralPattern:
+        """From dofs (n_e, m), the degrees of freedom 0..n-1 of every element, -1 where constrained."""
+        a, b = (x.astype(np.int64) for x in np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :]))
         return cls(n, *_slots(a, b, (a >= 0) & (b >= 0), n))
 
     def assemble(self, entries: Array) -> GeneralSparse:
         """Sum element matrices (n_e, m, m), rows first, into a matrix."""
-        return GeneralSparse(self, _summed(self.slots, entries.ravel(), len(self.indices)))
+        return GeneralSparse(self, _accumulate(self.slots, entries.ravel(), len(self.indices)))
 
 
 @dataclass(frozen=True, eq=False)
 class GeneralSparse:
-    """A matrix without symmetry: data (nnz,) in the order of its pattern."""
+    """A matrix without symmetry; data (nnz,) in the order of its pattern."""
 
     pattern: GeneralPattern
     data: Array
@@ -123,14 +123,14 @@ class GeneralSparse:
 
     @cached_property
     def rows(self) -> Any:
-        """A SciPy CSR array that shares this one's memory."""
+        """The matrix as a SciPy CSR array that shares `data`."""
         from scipy.sparse import csr_array
 
         return csr_array((self.data, self.pattern.indices, self.pattern.indptr), shape=self.shape)
 
     @property
     def T(self) -> Any:
-        """The transpose for products: a SciPy CSC array on the same memory."""
+        """The transpose as a SciPy CSC array that shares `data`."""
         return self.rows.T
 
     def full(self) -> Any:
@@ -152,7 +152,7 @@ class GeneralSparse:
 
 @dataclass(frozen=True, eq=False)
 class BlockDiagonal:
-    """diag(A_1, ..., A_c): several load cases in one state u = (u_1, ..., u_c), each with its own matrix."""
+    """diag(A_1, ..., A_c), the tangent of c load cases with the state u = (u_1, ..., u_c)."""
 
     blocks: tuple[Any, ...]
 
@@ -166,7 +166,7 @@ class BlockDiagonal:
         return BlockDiagonal(tuple(A.T for A in self.blocks))
 
     def split(self, v: Array) -> list[Array]:
-        """The parts of v (n,) that belong to the blocks."""
+        """The parts of v (n,), one per block."""
         return np.split(v, np.cumsum([A.shape[0] for A in self.blocks])[:-1])
 
     def __matmul__(self, v: Array) -> Array:
@@ -179,7 +179,7 @@ class BlockDiagonal:
 
 
 def _slots(rows: Array, columns: Array, free: Array, n: int) -> tuple[Array, Array, Array]:
-    """indptr, indices and flat slots of the CSR pattern that holds all free (row, column) pairs."""
+    """indptr, indices and flat slots of the CSR pattern of all free (row, column) pairs."""
     keys, slots_of_free = np.unique(rows[free] * n + columns[free], return_inverse=True)
     slots = np.full(free.shape, len(keys), dtype=np.int32)
     slots[free] = slots_of_free
@@ -187,8 +187,8 @@ def _slots(rows: Array, columns: Array, free: Array, n: int) -> tuple[Array, Arr
     return indptr, (keys % n).astype(np.int32), slots.ravel()
 
 
-def _summed(slots: Array, entries: Array, nnz: int) -> Array:
+def _accumulate(slots: Array, entries: Array, nnz: int) -> Array:
     """(nnz,) sums of the entries that share a slot."""
     if np.iscomplexobj(entries):
-        return _summed(slots, entries.real, nnz) + 1j * _summed(slots, entries.imag, nnz)
+        return _accumulate(slots, entries.real, nnz) + 1j * _accumulate(slots, entries.imag, nnz)
     return np.bincount(slots, weights=entries, minlength=nnz + 1)[:-1]

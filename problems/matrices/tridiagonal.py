@@ -1,9 +1,9 @@
-"""Matrices of a chain of springs: K = B^T D B with B bidiagonal, known by D alone.
+"""Tridiagonal stiffness matrices of springs in series: K = B^T D B with B bidiagonal, stored as D.
 
 Row e of B takes the difference over element e, (B u)_e = u_e - u_{e-1} with u_0 = 0; D holds the spring constants.
-B^{-1} is a cumulative sum, so K is solved in O(N) by two of them, and a right-hand side that vanishes beyond
-some node leaves exact zeros there: nothing is ever subtracted. What a stop at the last node N adds, e its unit vector,
-is a spring to the ground, K + k e e^T, or a multiplier that borders K with e.
+B^{-1} is a cumulative sum, so K is solved in O(N) by two of them; as nothing is subtracted, a right-hand side that
+vanishes beyond some node gives strains that are exactly 0 there. Contact at the last node N, with unit vector e, adds
+a spring to the ground, K + k e e^T, or a multiplier that borders K with e.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import numpy as np
 
 from gradient_routes.problems.problem import Array
 
-BLOCKED_FROM = 4096  # below, one sequential sum is as accurate as needed and faster
+BLOCKED_FROM = 4096  # below, one sequential sum is accurate enough and faster
 
 
 def cumulative_sum(x: Array) -> Array:
-    """Partial sums (n,) of x (n,), with rounding errors that grow like sqrt(n), not n.
+    """Partial sums (n,) of x (n,), with rounding errors that grow like sqrt(n) instead of n.
 
-    A sequential sum of 10^6 equal numbers is off by 1e-11. Here ~sqrt(n) blocks are summed one by one,
-    then shifted by the sums of the blocks before (Higham 2002, section 4.2). Zeros add nothing, exactly.
+    About sqrt(n) blocks are summed separately, then shifted by the sums of the blocks before (Higham 2002,
+    section 4.2). A sequential sum of 10^6 equal numbers has a relative error of 1e-11. Zeros are added exactly.
     """
     n = x.shape[0]
     if n < BLOCKED_FROM:
@@ -48,30 +48,30 @@ def divergence(q: Any, xp: Any = np) -> Any:
     return xp.concatenate([q[:-1] - q[1:], q[-1:]])
 
 
-def at_last(v: Any, q: Any, xp: Any = np) -> Any:
-    """v + q e, (N,): the force q on the last node added to the forces v. xp: numpy or jax.numpy."""
+def add_to_last(v: Any, q: Any, xp: Any = np) -> Any:
+    """v + q e, (N,): v with the force q added at the last node. xp: numpy or jax.numpy."""
     return xp.concatenate([v[:-1], v[-1:] + q])
 
 
 @dataclass(frozen=True)
-class Chain:
-    """The symmetric tridiagonal matrix B^T diag(D) B + tip e e^T, D (N,); tip is a spring behind the last node."""
+class Tridiagonal:
+    """The symmetric matrix B^T diag(D) B + end_spring e e^T, D (N,), with a spring from the last node to the ground."""
 
     D: Array
-    tip: Any = 0.0
+    end_spring: Any = 0.0
 
     @property
-    def T(self) -> Chain:
+    def T(self) -> Tridiagonal:
         return self
 
     def __matmul__(self, v: Any) -> Any:
         forces = divergence(self.D * difference(v))
-        return at_last(forces, self.tip * v[-1]) if self.tip else forces
+        return add_to_last(forces, self.end_spring * v[-1]) if self.end_spring else forces
 
     @property
     def norm(self) -> float:
         """An upper bound of |K|_inf, at most twice too large."""
-        return 4.0 * float(np.abs(self.D).max()) + float(abs(self.tip))
+        return 4.0 * float(np.abs(self.D).max()) + float(abs(self.end_spring))
 
     @property
     def nbytes(self) -> int:
@@ -79,10 +79,10 @@ class Chain:
 
 
 @dataclass(frozen=True)
-class Bordered:
-    """A chain K (N, N) and a multiplier on its last node, symmetric and indefinite, (N + 1, N + 1).
+class BorderedTridiagonal:
+    """A tridiagonal K (N, N) with a multiplier on the last node; symmetric, indefinite, (N + 1, N + 1).
 
-    [[K + c e e^T, e], [e^T, 0]] where the constraint u_N = const is active, [[K, 0], [0, -1/c]] where it is not.
+    [[K + c e e^T, e], [e^T, 0]] if the constraint u_N = const is active, else [[K, 0], [0, -1/c]].
     """
 
     D: Array
@@ -90,23 +90,23 @@ class Bordered:
     active: bool
 
     @property
-    def chain(self) -> Chain:
-        return Chain(self.D, self.c if self.active else 0.0)
+    def block(self) -> Tridiagonal:
+        return Tridiagonal(self.D, self.c if self.active else 0.0)
 
     @property
-    def T(self) -> Bordered:
+    def T(self) -> BorderedTridiagonal:
         return self
 
     def __matmul__(self, v: Any) -> Any:
-        forces, lam = self.chain @ v[:-1], v[-1:]
+        forces, lam = self.block @ v[:-1], v[-1:]
         if self.active:
-            return np.concatenate([at_last(forces, lam), v[-2:-1]])
+            return np.concatenate([add_to_last(forces, lam), v[-2:-1]])
         return np.concatenate([forces, -lam / self.c])
 
     @property
     def norm(self) -> float:
         """An upper bound of |A|_inf."""
-        return self.chain.norm + 1.0 if self.active else max(self.chain.norm, 1.0 / self.c)
+        return self.block.norm + 1.0 if self.active else max(self.block.norm, 1.0 / self.c)
 
     @property
     def nbytes(self) -> int:
@@ -115,7 +115,7 @@ class Bordered:
 
 @dataclass(frozen=True)
 class ElementForces:
-    """The matrix B^T diag(s): column e spreads the force s_e of element e onto its two nodes. Below, rows of zeros."""
+    """B^T diag(s): column e applies the force s_e of element e to its two nodes. Optional rows of zeros follow."""
 
     s: Array
     zero_rows: int = 0
@@ -131,7 +131,7 @@ class ElementForces:
 
 @dataclass(frozen=True)
 class ElementForcesTransposed:
-    """diag(s) B, and columns of zeros."""
+    """diag(s) B, followed by columns of zeros."""
 
     s: Array
     zero_columns: int = 0

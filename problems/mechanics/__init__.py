@@ -1,1 +1,1 @@
-"""Solid mechanics: stored energies, loaded solids, and what p stands for in them."""
+"""Solid mechanics: stored energies, loaded solids and design variables."""

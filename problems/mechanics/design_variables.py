@@ -1,4 +1,4 @@
-"""What p stands for in a solid: moduli, layers, constants of the law, tractions, a shape, or one amplitude."""
+"""Design variables p of a solid: moduli, layers, material constants, tractions, nodal positions or a load amplitude."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import Facets
-from gradient_routes.problems.fem.mesh import Body
+from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.problem import Array, Parameters
 
 if TYPE_CHECKING:
-    from gradient_routes.problems.mechanics.materials import Law
+    from gradient_routes.problems.mechanics.materials import MaterialLaw
 
-UnknownName = Literal["modulus", "layers", "constants", "traction", "shape", "load"]
-FIELDS: tuple[UnknownName, ...] = ("modulus", "layers")
-MATERIAL: tuple[UnknownName, ...] = ("modulus", "layers", "constants")
-THETA_MAX = 300.0  # exp of it is far from float64's end, and so are its squares
+DesignName = Literal["modulus", "layers", "constants", "traction", "shape", "load"]
+FIELDS: tuple[DesignName, ...] = ("modulus", "layers")
+MATERIAL: tuple[DesignName, ...] = ("modulus", "layers", "constants")
+MAX_DEFAULT_LAYERS = 4
+THETA_MAX = 300.0  # exp(THETA_MAX) and its square stay in float64's range
 
 
 @dataclass(frozen=True)
-class Setting:
-    """What a solid needs to know at p.
+class Setup:
+    """Everything R depends on besides u.
 
-    q     constants of the law, numbers or (n_e,) [Pa]
-    X     positions of the nodes (n_nodes, 3) [m]
-    load  the amplitude, [Pa] or [m], or tractions (n_f, 3) [Pa]
+    q     material constants, numbers or (n_e,) [Pa]
+    X     nodal positions (n_nodes, 3) [m]
+    load  the amplitude [Pa] or [m], or tractions (n_f, 3) [Pa]
     """
 
     q: tuple[Any, ...]
@@ -37,24 +38,24 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Unknown:
-    """What p is.
+class DesignVariables:
+    """The meaning of p.
 
-    apply   (setting, p, xp) -> the setting with p in its place
-    truth   the p (n_p,) behind synthetic data
-    q_p     (p) -> per constant of the law, its derivative by the one parameter each cell depends on and that
-            parameter's number, (n_e,) both; None where p is no material
-    group   (n_e,), the number of each cell's modulus, where p are moduli
-    nodes   numbers of the nodes whose positions p are, where they are
-    is_load p is the load's amplitude
+    apply            (setup, p, xp) -> the setup with p inserted
+    truth            the p (n_p,) that synthetic data are computed from
+    q_p              (p) -> for every material constant, its derivative with respect to the one parameter a cell
+                     depends on, and the index of that parameter, both (n_e,); None unless p sets the material
+    modulus_of_cell  (n_e,) index of each cell's modulus, if p are moduli
+    moved_nodes      the nodes whose positions p are, if it is a shape
+    is_load          whether p is the load amplitude
     """
 
     parameters: Parameters
-    apply: Callable[[Setting, Any, Any], Setting]
+    apply: Callable[[Setup, Any, Any], Setup]
     truth: Array
     q_p: Callable[[Array], list[tuple[Array, Array]]] | None = None
-    group: Array | None = None
-    nodes: Array | None = None
+    modulus_of_cell: Array | None = None
+    moved_nodes: Array | None = None
     is_load: bool = False
 
 
@@ -65,45 +66,66 @@ def default_modulus(x: Array) -> Array:
 
 
 def inclusion(x: Array) -> Array:
-    """E(x) = 4 in a ball of radius 0.3 about (0.5, 0.5, 0.6), or at the point next to its centre, else 1 [Pa]."""
+    """E(x) = 4 in a ball of radius 0.3 about (0.5, 0.5, 0.6), at least at the point nearest its centre, else 1 [Pa]."""
     r = np.linalg.norm(x - [0.5, 0.5, 0.6], axis=-1)
     return np.where(r < max(0.3, 1.001 * r.min()), 4.0, 1.0)
 
 
-def moduli(body: Body, law: Law, nu: float, log: bool, blank: bool) -> Unknown:
-    """One Young's modulus a cell. `blank`: start from E = 1 everywhere instead of the default field."""
-    x = body.relative(body.geometry.centres)
-    start = np.ones(len(x)) if blank else default_modulus(x)
+def moduli(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool) -> DesignVariables:
+    """One Young's modulus per cell. `uniform`: start from E = 1 instead of the default field."""
+    x = mesh.normalized(mesh.geometry.centres)
+    start = np.ones(len(x)) if uniform else default_modulus(x)
     cells = np.arange(len(x))
-    return _of_modulus(law, nu, log, start, inclusion(x), cells, body.geometry.centres, "E")
+    return _from_moduli(law, nu, log, start, inclusion(x), cells, mesh.geometry.centres, "E")
 
 
-def layers(body: Body, law: Law, nu: float, log: bool, blank: bool, count: int) -> Unknown:
-    """One Young's modulus for each of `count` layers of equal height."""
-    x = body.relative(body.geometry.centres)
-    layer = np.minimum((x[:, 2] * count).astype(int), count - 1)
-    z = (np.arange(count) + 0.5) / count
-    empty = np.setdiff1d(np.arange(count), layer)
+def layers(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, count: int | None) -> DesignVariables:
+    """One Young's modulus per layer, of `count` layers of equal height; None: the most, up to 4, that all hold a cell.
+
+    Raises InputError where a layer holds no cell's centre.
+    """
+    height = mesh.normalized(mesh.geometry.centres)[:, 2]
+    if count is None:
+        count = next(n for n in range(MAX_DEFAULT_LAYERS, 0, -1) if not _empty_layers(height, n).size)
+    empty = _empty_layers(height, count)
     if empty.size:
         raise InputError(
-            f"{body.who}: layers={count}, but no cell's centre lies in layer {empty[0] + 1} - choose fewer"
+            f"{mesh.who}: layers={count}, but no cell's centre lies in layer {empty[0] + 1} - choose fewer"
         )
+    layer = _layer_numbers(height, count)
+    z = (np.arange(count) + 0.5) / count
     middle = np.stack([np.full(count, 0.5)] * 2 + [z], axis=1)
-    start = np.ones(count) if blank else 1.0 + 0.3 * z
-    position = body.box[0] + middle * (body.box[1] - body.box[0])
-    return _of_modulus(law, nu, log, start, inclusion(middle), layer, position, "E_layer")
+    start = np.ones(count) if uniform else 1.0 + 0.3 * z
+    position = mesh.bounding_box[0] + middle * (mesh.bounding_box[1] - mesh.bounding_box[0])
+    return _from_moduli(law, nu, log, start, inclusion(middle), layer, position, "E_layer")
 
 
-def _of_modulus(
-    law: Law, nu: float, log: bool, start: Array, truth: Array, group: Array, position: Array, name: str
-) -> Unknown:
-    """Moduli E, cell e having that of group[e]; the law's constants are proportional to it."""
+def _layer_numbers(height: Array, count: int) -> Array:
+    """The layer (n_e,) of cells whose centres lie at a height from 0 to 1."""
+    return np.asarray(np.minimum((height * count).astype(int), count - 1))
+
+
+def _empty_layers(height: Array, count: int) -> Array:
+    return np.setdiff1d(np.arange(count), _layer_numbers(height, count))
+
+
+def _from_moduli(
+    law: MaterialLaw,
+    nu: float,
+    log: bool,
+    start: Array,
+    truth: Array,
+    modulus_of_cell: Array,
+    position: Array,
+    name: str,
+) -> DesignVariables:
+    """Moduli E, E[modulus_of_cell[e]] in cell e; the material constants are proportional to E."""
 
     def q(p: Any, xp: Any) -> tuple[Any, ...]:
-        return law.of_modulus((xp.exp(p) if log else p)[group], nu)
+        return law.of_modulus((xp.exp(p) if log else p)[modulus_of_cell], nu)
 
     def q_p(p: Array) -> list[tuple[Array, Array]]:
-        return [(c if log else c / p[group], group) for c in q(p, np)]
+        return [(c if log else c / p[modulus_of_cell], modulus_of_cell) for c in q(p, np)]
 
     parameters = Parameters(
         start=np.log(start) if log else start,
@@ -115,11 +137,11 @@ def _of_modulus(
         position=position,
     )
     truth = np.log(truth) if log else truth
-    return Unknown(parameters, lambda s, p, xp: replace(s, q=q(p, xp)), truth, q_p, group)
+    return DesignVariables(parameters, lambda s, p, xp: replace(s, q=q(p, xp)), truth, q_p, modulus_of_cell)
 
 
-def constants(body: Body, law: Law, nu: float) -> Unknown:
-    """The constants of the law, the same in every cell."""
+def constants(mesh: Mesh, law: MaterialLaw, nu: float) -> DesignVariables:
+    """The material constants, the same in every cell."""
     start = np.array(law.of_modulus(1.0, nu))
     parameters = Parameters(
         start=start,
@@ -128,21 +150,21 @@ def constants(body: Body, law: Law, nu: float) -> Unknown:
         unit="Pa",
         label=lambda i: law.constants[i],
     )
-    ones = np.ones(len(body.geometry.nodes))
+    ones = np.ones(len(mesh.geometry.nodes))
 
     def q_p(p: Array) -> list[tuple[Array, Array]]:
         return [(ones, np.full(len(ones), i)) for i in range(len(p))]
 
-    return Unknown(parameters, lambda s, p, xp: replace(s, q=tuple(p)), 1.3 * start, q_p)
+    return DesignVariables(parameters, lambda s, p, xp: replace(s, q=tuple(p)), 1.3 * start, q_p)
 
 
-def tractions(body: Body, facets: Facets, amplitude: float) -> Unknown:
-    """The traction vector on every loaded facet, facet by facet."""
+def tractions(mesh: Mesh, facets: Facets, amplitude: float) -> DesignVariables:
+    """The traction vector of every loaded facet."""
     n_f = len(facets.cells)
     start = np.zeros((n_f, 3))
     start[:, 2] = amplitude
     x = facets.centres
-    bump = 1.0 + 0.5 * np.prod(np.sin(np.pi * body.relative(x)[:, :2]), axis=1)
+    bump = 1.0 + 0.5 * np.prod(np.sin(np.pi * mesh.normalized(x)[:, :2]), axis=1)
     parameters = Parameters(
         start=start.ravel(),
         scale=np.full(3 * n_f, abs(amplitude) or 1.0),
@@ -151,20 +173,20 @@ def tractions(body: Body, facets: Facets, amplitude: float) -> Unknown:
         position=np.repeat(x, 3, axis=0),
     )
     truth = np.ravel(start * bump[:, None])
-    return Unknown(parameters, lambda s, p, xp: replace(s, load=p.reshape(n_f, 3)), truth)
+    return DesignVariables(parameters, lambda s, p, xp: replace(s, load=p.reshape(n_f, 3)), truth)
 
 
-def shape(body: Body, where: str, held: Array) -> Unknown:
-    """The positions of the nodes on a part of the surface, but for the nodes `held`."""
-    nodes = np.setdiff1d(body.surface(where).node_set, held)
+def shape(mesh: Mesh, where: str, held: Array) -> DesignVariables:
+    """Positions of the nodes on boundary `where` except the nodes `held`. Raises InputError if none is left."""
+    nodes = np.setdiff1d(mesh.boundary(where).node_set, held)
     if not nodes.size:
-        raise InputError(f"{body.who}: surface={where}: all its nodes are clamped or loaded - choose a free surface")
-    X, n = body.geometry.X, len(body.geometry.X)
+        raise InputError(f"{mesh.who}: surface={where}: all its nodes are clamped or loaded - choose a free surface")
+    X, n = mesh.geometry.X, len(mesh.geometry.X)
     index: Array = np.arange(3 * n)  # into (X, p)
     moved = np.ravel(3 * nodes[:, None] + np.arange(3))
     index[moved] = 3 * n + np.arange(len(moved))
     index = index.reshape(n, 3)
-    cell = float(np.cbrt(body.geometry.metric[1].sum() / len(body.geometry.nodes)))
+    cell = float(np.cbrt(mesh.geometry.metric[1].sum() / len(mesh.geometry.nodes)))
     parameters = Parameters(
         start=X[nodes].ravel(),
         scale=np.full(len(moved), cell),
@@ -172,18 +194,18 @@ def shape(body: Body, where: str, held: Array) -> Unknown:
         label=lambda i: f"{'xyz'[i % 3]}({nodes[i // 3] + 1})",
         position=np.repeat(X[nodes], 3, axis=0),
     )
-    inward = body.box.mean(axis=0) - X[nodes]
+    inward = mesh.bounding_box.mean(axis=0) - X[nodes]
     truth = np.ravel(X[nodes] + 0.05 * inward)
 
-    def apply(s: Setting, p: Any, xp: Any) -> Setting:
+    def apply(s: Setup, p: Any, xp: Any) -> Setup:
         return replace(s, X=xp.concatenate([X.ravel(), p])[index])
 
-    return Unknown(parameters, apply, truth, nodes=nodes)
+    return DesignVariables(parameters, apply, truth, moved_nodes=nodes)
 
 
-def amplitude(name: str, start: float, unit: str) -> Unknown:
-    """One number: how strong the load is."""
+def amplitude(name: str, start: float, unit: str) -> DesignVariables:
+    """One parameter, the load amplitude."""
     parameters = Parameters(
         start=np.array([start]), scale=np.array([abs(start) or 1.0]), unit=unit, label=lambda i: name
     )
-    return Unknown(parameters, lambda s, p, xp: replace(s, load=p[0]), np.array([1.25 * start]), is_load=True)
+    return DesignVariables(parameters, lambda s, p, xp: replace(s, load=p[0]), np.array([1.25 * start]), is_load=True)

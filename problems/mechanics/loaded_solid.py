@@ -1,8 +1,8 @@
-"""A loaded solid: what stands in R(u, p) = 0 for bodies, laws, supports and loads of any kind.
+"""Equilibrium R(u, p) = 0 of a hyperelastic solid under dead tractions, prescribed displacements or follower loads.
 
-    Pi(u, p) = sum over points of W(F, q) dx - work of dead tractions,     R = dPi/du - follower forces
+    Pi(u, p) = sum over quadrature points of W(F, q) dx - work of dead tractions,     R = dPi/du - follower forces
 
-p acts through a Setting: constants of the law, positions of the nodes, the load.
+p enters through a Setup: material constants, nodal positions and the load.
 """
 
 from __future__ import annotations
@@ -15,109 +15,109 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from gradient_routes.problems.errors import DomainError
-from gradient_routes.problems.fem.boundary_conditions import Supports
+from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions
 from gradient_routes.problems.fem.elements import Facets
-from gradient_routes.problems.fem.mesh import Body
+from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, GeneralPattern, SymmetricPattern
-from gradient_routes.problems.mechanics.design_variables import Setting, Unknown
+from gradient_routes.problems.mechanics.design_variables import DesignVariables, Setup
 from gradient_routes.problems.problem import Array, Operator
 
 if TYPE_CHECKING:
-    from gradient_routes.problems.fem.assembly_jax import CompiledResidual, Solid
-    from gradient_routes.problems.fem.assembly_numpy import HandSolid
-    from gradient_routes.problems.mechanics.materials import Law
+    from gradient_routes.problems.fem.assembly_jax import CompiledResidual, JaxAssembly
+    from gradient_routes.problems.fem.assembly_numpy import NumpyAssembly
+    from gradient_routes.problems.mechanics.materials import MaterialLaw
 
 Load = Literal["traction", "displacement", "follower"]
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanics:
-    """The equilibrium of a body in one or more load cases.
+class LoadedSolid:
+    """The equilibrium equations in one or more load cases.
 
-    directions (cases, 3)  of the traction or of the grip's motion, times the amplitude
-    at_rest                the setting where p says nothing
-    by_hand                derivatives of the law in NumPy instead of by JAX
+    directions (cases, 3)  traction or grip displacement per unit amplitude; of a follower load, z is its normal part
+    base                   the setup for everything that p does not set
+    use_numpy              take P, A and dP/dq from hand-derived NumPy code instead of JAX
     """
 
-    body: Body
-    law: Law
-    supports: Supports
+    mesh: Mesh
+    law: MaterialLaw
+    bc: BoundaryConditions
     loaded: Facets
     load: Load
     directions: Array
-    unknown: Unknown
-    at_rest: Setting
-    by_hand: bool = False
+    design: DesignVariables
+    base: Setup
+    use_numpy: bool = False
 
     @property
     def symmetric(self) -> bool:
-        """Whether R_u is: a follower load has no potential."""
+        """Whether R_u is symmetric: a follower load has no potential."""
         return self.load != "follower"
 
     @property
-    def moves_grip(self) -> bool:
-        """Whether p is how far the grip goes, and what a grip moves is moved by p with u held."""
-        return self.load == "displacement" and self.unknown.is_load
+    def grip_is_parameter(self) -> bool:
+        """Whether p is the grip displacement; gripped nodes then move with p at fixed u."""
+        return self.load == "displacement" and self.design.is_load
 
-    def alone(self, case: int) -> Mechanics:
-        """In one load case."""
+    def single_case(self, case: int) -> LoadedSolid:
+        """The same solid in load case `case` only."""
         of = slice(case, case + 1)
-        supports = replace(self.supports, index=self.supports.index[of])
-        return replace(self, supports=supports, directions=self.directions[of])
+        bc = replace(self.bc, index=self.bc.index[of])
+        return replace(self, bc=bc, directions=self.directions[of])
 
-    def setting(self, p: Any, xp: Any = np) -> Setting:
-        """Constants of the law, positions of the nodes and load at p."""
-        return self.unknown.apply(self.at_rest, p, xp)
+    def setup(self, p: Any, xp: Any = np) -> Setup:
+        """Material constants, nodal positions and load at p."""
+        return self.design.apply(self.base, p, xp)
 
     def check(self, p: Array) -> None:
-        """Raises DomainError where p turns a cell inside out."""
-        if self.unknown.nodes is None:
+        """Raises DomainError if the nodal positions at p invert a cell."""
+        if self.design.moved_nodes is None:
             return
-        _, dx = self.body.geometry.at(self.setting(p).X, np)
+        _, dx = self.mesh.geometry.at(self.setup(p).X, np)
         folded = np.flatnonzero(~(dx.real > 0.0).all(axis=1))
         if folded.size:
             raise DomainError(
-                f"{self.body.who}: at this p {folded.size} of {len(dx)} cells are inside out, first cell"
+                f"{self.mesh.who}: at this p {folded.size} of {len(dx)} cells are inside out, first cell"
                 f" {folded[0] + 1} - move the nodes less"
             )
 
-    def metric(self, s: Setting, xp: Any) -> tuple[Any, Any]:
-        """dN, dx of the cells; worked out anew only where p moves the nodes."""
-        geometry = self.body.geometry
+    def metric(self, s: Setup, xp: Any) -> tuple[Any, Any]:
+        """dN, dx of the cells; recomputed only if p moves the nodes."""
+        geometry = self.mesh.geometry
         return geometry.metric if s.X is geometry.X else geometry.at(s.X, xp)
 
-    def displacements(self, u: Any, s: Setting, case: int, nodes: Array, xp: Any = np) -> Any:
-        a = s.load if self.load == "displacement" else 0.0 * self.at_rest.load
-        return self.supports.displacements(u, a, case, nodes, xp)
+    def displacements(self, u: Any, s: Setup, case: int, nodes: Array, xp: Any = np) -> Any:
+        a = s.load if self.load == "displacement" else 0.0 * self.base.load
+        return self.bc.displacements(u, a, case, nodes, xp)
 
-    # --- the physics, once
+    # --- the equations
 
     def potential(self, u: Any, p: Any) -> Any:
-        """Pi(u, p) [N m], stored energy less the work of dead tractions; traceable."""
+        """Pi(u, p) [N m], stored energy minus the work of dead tractions; traceable by JAX."""
         from gradient_routes.problems.jax64 import jnp
 
-        s = self.setting(p, jnp)
+        s = self.setup(p, jnp)
         dN, dx = self.metric(s, jnp)
         Pi = 0.0
         for case in range(len(self.directions)):
-            Pi += self.solid.energy(self.displacements(u, s, case, self.body.geometry.nodes, jnp), s.q, dN, dx)
+            Pi += self._jax.energy(self.displacements(u, s, case, self.mesh.geometry.nodes, jnp), s.q, dN, dx)
             if self.load == "traction":
                 f = self.dead_forces(s, case, jnp)
                 Pi -= (f * self.displacements(u, s, case, self.loaded.nodes, jnp)).sum()
         return Pi
 
-    def dead_forces(self, s: Setting, case: int, xp: Any) -> Any:
-        """Of the traction on the loaded facets, node by node: (n_f, n_a, 3) [N]."""
+    def dead_forces(self, s: Setup, case: int, xp: Any) -> Any:
+        """Nodal forces (n_f, n_a, 3) [N] of the traction on the loaded facets."""
         t = s.load if s.load.ndim == 2 else s.load * self.directions[case][None]  # (n_f or 1, 3)
         return xp.einsum("fqa,fq->fa", self.loaded.N, self.loaded.areas(s.X, xp))[..., None] * t[:, None]
 
-    def follower_forces(self, u_f: Any, s: Setting, case: int, xp: Any) -> Any:
-        """The same of a traction along the deformed normal, u_f (n_f, n_a, 3) the facets' displacements."""
+    def follower_forces(self, u_f: Any, s: Setup, case: int, xp: Any) -> Any:
+        """The same for a traction along the deformed normal; u_f (n_f, n_a, 3) displacements of the facets' cells."""
         normals = self.loaded.normals(s.X[self.loaded.nodes] + u_f, xp)
-        return s.load / (1.0 + case) * xp.einsum("fqa,fqi->fai", self.loaded.N, normals)
+        return s.load * self.directions[case, 2] * xp.einsum("fqa,fqi->fai", self.loaded.N, normals)
 
-    def external_forces(self, u: Array, s: Setting, case: int) -> Array | None:
-        """On the loaded facets, node by node (n_f, n_a, 3) [N]; None where a grip moves them."""
+    def external_forces(self, u: Array, s: Setup, case: int) -> Array | None:
+        """Nodal forces (n_f, n_a, 3) [N] on the loaded facets; None for a prescribed displacement."""
         if self.load == "traction":
             return np.asarray(self.dead_forces(s, case, np))
         if self.load == "follower":
@@ -125,64 +125,64 @@ class Mechanics:
             return np.asarray(self.follower_forces(u_f, s, case, np))
         return None
 
-    def follower(self, u: Any, p: Any) -> Any:
-        """-f_ext (n_u,) of a load that has no potential; traceable."""
+    def follower_residual(self, u: Any, p: Any) -> Any:
+        """-f_ext (n_u,) of a follower load; traceable by JAX."""
         from gradient_routes.problems.jax64 import jnp
 
-        s, n, facets = self.setting(p, jnp), self.supports.n_free, self.loaded
+        s, n, facets = self.setup(p, jnp), self.bc.n_free, self.loaded
         parts = []
-        for case, index in enumerate(self.supports.index):
+        for case, index in enumerate(self.bc.index):
             f = self.follower_forces(self.displacements(u, s, case, facets.nodes, jnp), s, case, jnp)
             parts.append(-jnp.zeros(n + 2, f.dtype).at[index[facets.nodes]].add(f)[:n])
         return jnp.concatenate(parts)
 
     @cached_property
-    def solid(self) -> Solid:
-        from gradient_routes.problems.fem.assembly_jax import Solid
+    def _jax(self) -> JaxAssembly:
+        from gradient_routes.problems.fem.assembly_jax import JaxAssembly
 
-        return Solid(self.law.W)
+        return JaxAssembly(self.law.W)
 
     @cached_property
     def _compiled(self) -> CompiledResidual:
         from gradient_routes.problems.fem.assembly_jax import CompiledResidual
 
-        return CompiledResidual(self.potential, self.follower if self.load == "follower" else None)
+        return CompiledResidual(self.potential, self.follower_residual if self.load == "follower" else None)
 
-    # --- as numbers
+    # --- evaluated in NumPy
 
     def initial(self, p: Array) -> Array:
-        """Zero; where a grip moves, every node goes along as far as it is near to it."""
-        u = np.zeros(self.supports.n_u, dtype=p.dtype)
+        """u = 0; with a grip, its displacement interpolated to the clamp by distance."""
+        u = np.zeros(self.bc.n_u, dtype=p.dtype)
         if self.load != "displacement":
             return u
-        a = self.setting(p).load
+        a = self.setup(p).load
         for case, direction in enumerate(self.directions):
-            moved = self._nearness[:, None] * direction * a
-            index = self.supports.index[case]
-            free = index < self.supports.n_free
-            u[case * self.supports.n_free + index[free]] = moved[free]
+            moved = self._ramp[:, None] * direction * a
+            index = self.bc.index[case]
+            free = index < self.bc.n_free
+            u[case * self.bc.n_free + index[free]] = moved[free]
         return u
 
     @cached_property
-    def _nearness(self) -> Array:
-        """(n_nodes,), 0 at the clamp, 1 at the grip."""
+    def _ramp(self) -> Array:
+        """(n_nodes,), from 0 at the clamp to 1 at the grip."""
         from scipy.spatial import cKDTree
 
-        X = self.body.geometry.X
-        to_clamp, to_grip = (cKDTree(X[nodes]).query(X)[0] for nodes in (self.supports.clamped, self.supports.gripped))
+        X = self.mesh.geometry.X
+        to_clamp, to_grip = (cKDTree(X[nodes]).query(X)[0] for nodes in (self.bc.clamped, self.bc.gripped))
         return np.asarray(to_clamp / (to_clamp + to_grip))
 
     def residual(self, u: Array, p: Array) -> Array:
         self.check(p)
-        return self._hand.residual(u, p) if self.by_hand else self._compiled(u, p)
+        return self._numpy.residual(u, p) if self.use_numpy else self._compiled(u, p)
 
     def tangent(self, u: Array, p: Array) -> Any:
-        s = self.setting(p)
-        metric, nodes = self.metric(s, np), self.body.geometry.nodes
+        s = self.setup(p)
+        metric, nodes = self.metric(s, np), self.mesh.geometry.nodes
         blocks = []
         for case in range(len(self.directions)):
             u_e = self.displacements(u, s, case, nodes)
-            K = (self._hand if self.by_hand else self.solid).tangents(u_e, s.q, *metric, self._pick)
+            K = (self._numpy if self.use_numpy else self._jax).element_tangents(u_e, s.q, *metric, self._selected)
             if self.load == "follower":
                 u_f = self.displacements(u, s, case, self.loaded.nodes)
                 np.subtract.at(K, self.loaded.cells, self._follower_tangents(u_f, s, case))
@@ -191,20 +191,20 @@ class Mechanics:
 
     @cached_property
     def pattern(self) -> SymmetricPattern | GeneralPattern:
-        geometry, n = self.body.geometry, self.supports.n_free
-        unknowns = self.supports.unknowns(geometry.nodes)
+        geometry, n = self.mesh.geometry, self.bc.n_free
+        dofs = self.bc.dofs(geometry.nodes)
         if not self.symmetric:
-            return GeneralPattern.of_elements(unknowns, n)
-        return SymmetricPattern.of_elements(unknowns, n, self.supports.rigid_motions(geometry.X))
+            return GeneralPattern.of_elements(dofs, n)
+        return SymmetricPattern.of_elements(dofs, n, self.bc.rigid_body_modes(geometry.X))
 
     @cached_property
-    def _pick(self) -> Array:
-        """The entries of an element matrix that the pattern takes."""
-        m = 3 * self.body.geometry.nodes.shape[1]
+    def _selected(self) -> Array:
+        """Flat indices of the element matrix entries that the pattern stores."""
+        m = 3 * self.mesh.geometry.nodes.shape[1]
         i, j = np.triu_indices(m)
         return i * m + j if self.symmetric else np.arange(m * m)
 
-    def _follower_tangents(self, u_f: Array, s: Setting, case: int) -> Array:
+    def _follower_tangents(self, u_f: Array, s: Setup, case: int) -> Array:
         """df_ext/du_f, (n_f, (3 n_a)^2)."""
         return np.asarray(self._follower_derivative(u_f, s.load, s.X, case)).reshape(len(u_f), -1)
 
@@ -213,10 +213,10 @@ class Mechanics:
         from gradient_routes.problems.jax64 import jax, jnp
 
         def forces(u_f: Any, load: Any, X: Any, case: int) -> Any:
-            return self.follower_forces(u_f, Setting((), X, load), case, jnp)
+            return self.follower_forces(u_f, Setup((), X, load), case, jnp)
 
         def columns(u_f: Any, load: Any, X: Any, case: int) -> Any:
-            """Facets do not know each other: one product gives a column of every facet's matrix."""
+            """Facets are decoupled: one product gives one column of every facet matrix."""
             m = 3 * u_f.shape[1]
             units = jnp.broadcast_to(jnp.eye(m, dtype=u_f.dtype).reshape(m, 1, *u_f.shape[1:]), (m, *u_f.shape))
             along = jax.vmap(lambda v: jax.jvp(lambda u_f: forces(u_f, load, X, case), (u_f,), (v,))[1])(units)
@@ -225,11 +225,11 @@ class Mechanics:
         return jax.jit(columns, static_argnums=3)
 
     def tangent_operator(self, u: Array, p: Array) -> Operator:
-        return self._compiled.by_u(u, p)
+        return self._compiled.R_u(u, p)
 
-    def by_p(self, u: Array, p: Array) -> Operator:
+    def R_p(self, u: Array, p: Array) -> Operator:
         """R_p (n_u, n_p)."""
-        return self._hand.by_p(u, p) if self.by_hand else self._compiled.by_p(u, p)
+        return self._numpy.R_p(u, p) if self.use_numpy else self._compiled.R_p(u, p)
 
     @property
     def traced_residual(self) -> Callable[[Any, Any], Any]:
@@ -237,7 +237,7 @@ class Mechanics:
         return self._compiled.R
 
     @cached_property
-    def _hand(self) -> HandSolid:
-        from gradient_routes.problems.fem.assembly_numpy import HandSolid
+    def _numpy(self) -> NumpyAssembly:
+        from gradient_routes.problems.fem.assembly_numpy import NumpyAssembly
 
-        return HandSolid(self)
+        return NumpyAssembly(self)

@@ -1,7 +1,7 @@
-"""Derivatives of stored energies by hand, in NumPy: W -> P = dW/dF -> A = dP/dF, and dP/dq.
+"""Hand-derived derivatives of stored energies in NumPy: W -> P = dW/dF -> A = dP/dF, and dP/dq.
 
-Written as on paper, for components first: F (3, 3, m) at m points, q of numbers or (m,). What is public takes points
-first, F (..., 3, 3), in pieces that stay in cache. With G = F^-T, everything follows from
+The formulas take the components first, F (3, 3, m) at m points, q numbers or (m,). The public functions take the points
+first, F (..., 3, 3), and work in chunks that fit the cache. With G = F^-T,
 
     dJ/dF_kL = J G_kL,     dG_iJ/dF_kL = -G_iL G_kJ.
 """
@@ -16,21 +16,21 @@ import numpy as np
 
 from gradient_routes.problems.problem import Array
 
-CHUNK = 1000  # points at a time; transposing powers of two is slow: a cache keeps few addresses with the same low bits
-ONE = np.eye(3)[..., None]  # (3, 3, 1)
-NEXT, LAST = [1, 2, 0], [2, 0, 1]  # cyclic indices
+POINTS_PER_CHUNK = 1000  # stays in cache; with a power of two, transposed arrays share few cache sets
+IDENTITY = np.eye(3)[..., None]  # (3, 3, 1)
+NEXT, PREVIOUS = [1, 2, 0], [2, 0, 1]  # cyclic indices
 
 Constants = tuple[Any, ...]
 Function = Callable[[Array, Constants], Array]
 
 
 @dataclass(frozen=True)
-class Hand:
+class NumpyMaterial:
     """A stored energy W(F, q) and its derivatives in NumPy, real or complex, for F (..., 3, 3).
 
     q is a tuple of constants that broadcast against F.shape[:-2]; P (..., 3, 3) first Piola-Kirchhoff stress,
     A (..., 3, 3, 3, 3) with A[..., i, J, k, L] = dP_iJ/dF_kL, P_q a tuple of dP/dq (..., 3, 3), one per constant.
-    Law: P = dW/dF, A = dP/dF = its own transpose (i, J) <-> (k, L), and not a number where J = det F < 0 is real.
+    Law: P = dW/dF, A = dP/dF, symmetric under (i, J) <-> (k, L); NaN for Re det F <= 0.
     """
 
     W: Function
@@ -40,7 +40,7 @@ class Hand:
 
 
 def at_points(f: Function, *shape: int) -> Function:
-    """f for components first, (*shape, m) of F (3, 3, m), turned into one for points first, (..., *shape)."""
+    """Turns f of F (3, 3, m), (*shape, m), into a function of F (..., 3, 3), (..., *shape)."""
     components_last = (len(shape), *range(len(shape)))
 
     def at_every_point(F: Array, q: Constants) -> Array:
@@ -49,20 +49,20 @@ def at_points(f: Function, *shape: int) -> Function:
         F = np.broadcast_to(F, (*points, 3, 3)).reshape(m, 3, 3)
         q = tuple(np.broadcast_to(c, points).reshape(m) if np.ndim(c) else c for c in q)
         values = np.empty((m, *shape), np.result_type(F, *q, np.float64))
-        for first in range(0, m, CHUNK):
-            chunk = slice(first, first + CHUNK)
+        for first in range(0, m, POINTS_PER_CHUNK):
+            chunk = slice(first, first + POINTS_PER_CHUNK)
             piece = tuple(c[chunk] if np.ndim(c) else c for c in q)
-            with np.errstate(all="ignore"):  # as JAX does: what is not a number, or infinite, says so itself
+            with np.errstate(all="ignore"):  # NaN and infinity are results here, as in JAX
                 values[chunk] = f(np.ascontiguousarray(F[chunk].transpose(1, 2, 0)), piece).transpose(components_last)
         return values.reshape((*points, *shape))
 
     return at_every_point
 
 
-def by_hand(W: Function, P: Function, A: Function, P_q: Function, n_q: int) -> Hand:
-    """From functions of components first; those of P_q come stacked, (n_q, 3, 3, m)."""
+def numpy_material(W: Function, P: Function, A: Function, P_q: Function, n_q: int) -> NumpyMaterial:
+    """From functions that take the components first; P_q returns (n_q, 3, 3, m)."""
     stacked = at_points(P_q, n_q, 3, 3)
-    return Hand(
+    return NumpyMaterial(
         at_points(W),
         at_points(P, 3, 3),
         at_points(A, 3, 3, 3, 3),
@@ -72,10 +72,10 @@ def by_hand(W: Function, P: Function, A: Function, P_q: Function, n_q: int) -> H
 
 def J_and_G(F: Array) -> tuple[Array, Array]:
     """det F (m,) and F^-T (3, 3, m), by cofactors."""
-    a, b = F[NEXT], F[LAST]
-    cof = a[:, NEXT] * b[:, LAST] - a[:, LAST] * b[:, NEXT]
+    a, b = F[NEXT], F[PREVIOUS]
+    cof = a[:, NEXT] * b[:, PREVIOUS] - a[:, PREVIOUS] * b[:, NEXT]
     J = (F[0] * cof[0]).sum(axis=0)
-    J = np.where(J.real > 0.0, J, np.nan)  # inside out: no energy, no forces
+    J = np.where(J.real > 0.0, J, np.nan)  # inverted elements are not admissible
     return J, cof / J
 
 
@@ -121,7 +121,7 @@ def neo_hookean_A(F: Array, q: Constants) -> Array:
     J, G = J_and_G(F)
     A = dyad(lam * G, G)
     A -= swapped(dyad((lam * np.log(J) - mu) * G, G))
-    add_in_rows(A, mu * ONE)
+    add_in_rows(A, mu * IDENTITY)
     return A
 
 
@@ -131,7 +131,7 @@ def neo_hookean_P_q(F: Array, q: Constants) -> Array:
     return np.stack([F - G, np.log(J) * G])
 
 
-NEO_HOOKEAN = by_hand(neo_hookean_W, neo_hookean_P, neo_hookean_A, neo_hookean_P_q, 2)
+NEO_HOOKEAN = numpy_material(neo_hookean_W, neo_hookean_P, neo_hookean_A, neo_hookean_P_q, 2)
 
 
 def products(F: Array) -> tuple[Array, Array]:
@@ -176,7 +176,7 @@ def mooney_rivlin_A(F: Array, q: Constants) -> Array:
     A += dyad(2.0 * c * (2.0 * J - 1.0) * J * G, G)
     A -= swapped(dyad(2.0 * c2 * F, F))
     A -= swapped(dyad(h * G, G))
-    add_in_rows(A, 2.0 * (c1 + c2 * (C[0, 0] + C[1, 1] + C[2, 2])) * ONE - 2.0 * c2 * C)
+    add_in_rows(A, 2.0 * (c1 + c2 * (C[0, 0] + C[1, 1] + C[2, 2])) * IDENTITY - 2.0 * c2 * C)
     add_in_columns(A, -2.0 * c2 * B)
     return A
 
@@ -187,4 +187,4 @@ def mooney_rivlin_P_q(F: Array, q: Constants) -> Array:
     return np.stack([2.0 * (F - G), gradient_of_I2(F) - 4.0 * G, 2.0 * (J - 1.0) * J * G])
 
 
-MOONEY_RIVLIN = by_hand(mooney_rivlin_W, mooney_rivlin_P, mooney_rivlin_A, mooney_rivlin_P_q, 3)
+MOONEY_RIVLIN = numpy_material(mooney_rivlin_W, mooney_rivlin_P, mooney_rivlin_A, mooney_rivlin_P_q, 3)

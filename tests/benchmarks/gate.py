@@ -18,8 +18,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from kernels import REMEDY, Kernels, again, judge, of_session, read, typical, write
+
 from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding
-from gradient_routes.bench.regression.regression import REMEDY, Kernels, again, judge, of_session, read, typical, write
 from gradient_routes.problems.errors import InputError
 
 HERE = Path(__file__).parent

@@ -8,7 +8,7 @@ from conftest import relative_error, somewhere
 
 from gradient_routes.problems.advection import Advection, plume
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.supg import Supg, direction
+from gradient_routes.problems.fem.supg import Supg, unit_vector
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
@@ -45,7 +45,7 @@ def test_along_the_flow_it_converges_to_the_exponential_solution() -> None:
 @pytest.mark.parametrize("angle", [20.0, 45.0, 90.0])
 def test_it_converges_to_a_manufactured_solution(angle: float) -> None:
     """u = sin(pi x / 2) sin(pi y / 2), 0 at the inflow and of zero slope at the outflow; f follows from it."""
-    k, errors, b = 0.05, [], direction(angle)
+    k, errors, b = 0.05, [], unit_vector(angle)
 
     def u(x: Array) -> Array:
         s = np.sin(np.pi * x / 2)
@@ -67,12 +67,12 @@ def test_it_converges_to_a_manufactured_solution(angle: float) -> None:
 def test_supg_does_not_oscillate_where_galerkin_does() -> None:
     """u = 0 at the outflow, too: a layer 1e-5 m wide in cells of 0.05 m, before which u = x along the flow."""
     n, k = 20, 1e-5
-    supg = Supg.of(n, direction(0.0))
+    supg = Supg.of(n, unit_vector(0.0))
     kappa, f = np.full(n * n, k), np.ones(n * n)
     x, inside = supg.x[:, 0], supg.x[:, 0] < 1.0
     stabilized = supg.tangent(kappa), -supg.residual(np.zeros(len(x)), kappa, f)
     galerkin = supg.pattern.assemble(np.broadcast_to(k * supg.D + supg.C, (n * n, 4, 4)))
-    plain = galerkin, supg.columns(np.broadcast_to(supg.m, (n * n, 4))) @ f
+    plain = galerkin, supg.cellwise_columns(np.broadcast_to(supg.m, (n * n, 4))) @ f
     missed = []
     for A, load in (stabilized, plain):
         u = np.linalg.solve(A.full().toarray()[np.ix_(inside, inside)], load[inside])
@@ -83,7 +83,7 @@ def test_supg_does_not_oscillate_where_galerkin_does() -> None:
 
 def test_element_matrices_are_those_of_the_weak_form() -> None:
     """b . grad 1 = 0, b . grad (b . x) = 1; rows sum to zero where test functions do, not where they need not."""
-    b, n = direction(30.0), 5
+    b, n = unit_vector(30.0), 5
     supg = Supg.of(n, b)
     corners = supg.mesh.p.T[supg.mesh.t.T[0]] @ b
     for term, of_flow in ((supg.D, None), (supg.C, supg.m), (supg.S, supg.s)):
@@ -96,8 +96,8 @@ def test_element_matrices_are_those_of_the_weak_form() -> None:
 
 @pytest.mark.parametrize("kappa", [1e-6, 0.01, 10.0])
 def test_tau_has_its_limits_and_its_derivative(kappa: float) -> None:
-    supg = Supg.of(10, direction(0.0))
-    h = supg.length
+    supg = Supg.of(10, unit_vector(0.0))
+    h = supg.h
     assert h == pytest.approx(0.1)
     assert supg.tau_kappa(kappa) == pytest.approx(np.imag(supg.tau(kappa + 1e-30j)) / 1e-30, rel=1e-13)
     assert 0.5 < supg.tau(kappa) / min(h / 2.0, h**2 / (12.0 * kappa)) <= 1.0
@@ -140,7 +140,7 @@ def test_the_continuous_adjoint_misses_the_gradient_by_less_on_finer_meshes(opti
 
 def test_the_adjoint_advection_is_that_of_its_own_equation() -> None:
     """(w, -b . grad lam) + the outflow's (w, b . n lam) = C^T by parts: what the boundary condition stands for."""
-    n, b = 6, direction(30.0)
+    n, b = 6, unit_vector(30.0)
     supg = Supg.of(n, b)
     backwards = Supg.of(n, -b)
     C_T = supg.pattern.assemble(np.broadcast_to(supg.C.T, (n * n, 4, 4))).full()
@@ -158,7 +158,7 @@ def test_refined_is_the_same_on_half_the_mesh_size() -> None:
     coarse = Advection(n=3, angle=50.0, unknown="source", alpha=0.1, sensors="everywhere")
     fine, _ = coarse.refined(coarse.parameters.start)
     assert (fine.n, fine.alpha, fine.on_outflow) == (6, 0.1, False)
-    assert fine.supg.length == pytest.approx(coarse.supg.length / 2)
+    assert fine.supg.h == pytest.approx(coarse.supg.h / 2)
     np.testing.assert_allclose(fine.supg.b, coarse.supg.b)
     np.testing.assert_allclose(fine.parameters.start, plume(fine.parameters.position, fine.supg.b))
     assert fine.parameters.position.shape == (36, 2)

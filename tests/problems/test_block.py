@@ -18,7 +18,7 @@ from gradient_routes.routes.route import Route
 
 def top(block: Block, u: np.ndarray) -> np.ndarray:
     """Displacements of the nodes on the top, (m, 3)."""
-    return block.mechanics.supports.displacements(u, 0.0, 0, block.mechanics.loaded.node_set, np)
+    return block.solid.bc.displacements(u, 0.0, 0, block.solid.loaded.node_set, np)
 
 
 DATA = ROOT / "tests" / "data"
@@ -147,7 +147,9 @@ def test_bad_options_of_the_block_are_one_line(options: dict, says: str) -> None
 def test_a_converged_state_with_a_wrong_gradient_is_warned_of(cli) -> None:
     """The reverse sweep of conjugate gradients amplifies rounding: iterates converge, their gradient does not."""
     routes = ("--route", "unrolled-ad[inner=cg]", "--route", "adjoint")
-    unrolled, sound = cli(*"run --json --no-store --min-time 0 --problem block[law=linear,n=3]".split(), *routes).rows
+    ran = cli(*"run --json --no-store --min-time 0 --problem block[law=linear,n=3]".split(), *routes)
+    rows = {row["route"]: row for row in ran.rows}  # printed in the order they are done
+    unrolled, sound = rows["unrolled-ad"], rows["adjoint"]
     assert unrolled["residual"] < 1e-11
     assert unrolled["gradient_error"] > 1e-2
     assert "do not use it" in unrolled["note"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,11 @@ from skfem.io.meshio import from_meshio, to_meshio
 
 from benchmarks.sensitivity_picture import slice_of
 from gradient_routes.problems.block import Block
+from gradient_routes.problems.data.probes import read_probes
 from gradient_routes.problems.errors import DomainError, InputError
-from gradient_routes.problems.fem import mesh as bodies
 from gradient_routes.problems.fem.assembly_jax import gradient
-from gradient_routes.problems.fem.elements import Geometry
+from gradient_routes.problems.fem.elements import Element, Geometry
+from gradient_routes.problems.fem.mesh import box_mesh, read_mesh
 from gradient_routes.problems.jax64 import jax
 from gradient_routes.problems.mechanics.materials import LAWS
 from gradient_routes.problems.problem import Array
@@ -109,7 +112,7 @@ def test_the_picture_shows_the_inclusion_and_a_gradient_that_points_at_it() -> N
 def test_mesh_files_give_the_body_they_hold(element: str, tmp_path: Path) -> None:
     """Written from a box, read back: the same gradient, with the faces the file names."""
     path, box = str(tmp_path / "box.vtu"), Block(**SMALL, element=element)
-    named = box.body.mesh.with_boundaries({"grip": box.body.mesh.facets_satisfying(lambda x: x[2] == 0.0)})
+    named = box.mesh.skfem_mesh.with_boundaries({"grip": box.mesh.skfem_mesh.facets_satisfying(lambda x: x[2] == 0.0)})
     to_meshio(named).write(path)
     read = Block(mesh=path, clamped="grip", loaded="z=1")
     assert (read.n_state, len(read.parameters)) == (box.n_state, len(box.parameters))
@@ -118,7 +121,7 @@ def test_mesh_files_give_the_body_they_hold(element: str, tmp_path: Path) -> Non
     assert relative_error(other.gradient, one.gradient) < 1e-11
     fields = read.fields(p, other.u, other.lam, other.gradient)
     back = Mesh(fields.points, [(fields.cell_type, fields.cells)])
-    assert from_meshio(back).p.shape == read.body.mesh.p.shape
+    assert from_meshio(back).p.shape == read.mesh.skfem_mesh.p.shape
 
 
 def test_a_patch_of_any_element_is_stretched_evenly() -> None:
@@ -127,8 +130,8 @@ def test_a_patch_of_any_element_is_stretched_evenly() -> None:
     for element in ("hex8", "tet4", "tet10"):
         block = Block(**SMALL, element=element, nu=0.0, traction=0.3, size="1,2,3")
         u = Model(block).solve(np.zeros(len(block.parameters))).u
-        X = block.body.geometry.X
-        U = block.mechanics.supports.displacements(u, 0.0, 0, np.arange(len(X)), np)
+        X = block.mesh.geometry.X
+        U = block.solid.bc.displacements(u, 0.0, 0, np.arange(len(X)), np)
         np.testing.assert_allclose(U, X * [0.0, 0.0, s - 1.0], atol=1e-11)
 
 
@@ -139,17 +142,64 @@ def test_a_follower_pressure_has_a_tangent_that_is_not_symmetric() -> None:
     assert abs(K - K.T).max() > 1e-3 * abs(K).max()
 
 
+@pytest.mark.parametrize(("nz", "n_p"), [(1, 1), (2, 2), (3, 3), (4, 4), (5, 4), (9, 4)])
+def test_layers_default_to_four_or_what_the_mesh_has(nz: int, n_p: int) -> None:
+    block = Block(n=1, nz=nz, unknown="layers")
+    p = block.parameters.start
+    assert len(p) == n_p
+    finer, q = block.refined(p)
+    assert len(finer.parameters) == len(q) == n_p
+    assert set(block.solid.design.modulus_of_cell) == set(range(n_p))
+    with pytest.raises(InputError, match=r"lies in layer \d - choose fewer"):
+        Block(n=1, nz=nz, unknown="layers", layers=nz + 1 if nz < 4 else 2 * nz)
+
+
+FORCES = {"traction": np.diag([1.0, 0.25, 0.25])[:, [1, 2, 0]], "follower": np.outer([1.0, 1 / 2, 1 / 3], [0, 0, 1])}
+
+
+@pytest.mark.parametrize("load", FORCES)
+@pytest.mark.parametrize("derivatives", ["ad", "hand"])
+def test_load_cases_have_the_resultant_forces_of_the_documentation(load: str, derivatives: str) -> None:
+    """At u = 0, R = -f_ext: the forces on a face of 1 x 2 m^2 sum to traction x area x the factor of the case."""
+    block = Block(**SMALL, size="1,2,1", load=load, cases=3, traction=0.3, derivatives=derivatives)
+    R = block.residual(np.zeros(block.n_state), block.parameters.start).reshape(3, -1, 3)
+    np.testing.assert_allclose(-R.sum(axis=1), 0.3 * 2.0 * FORCES[load], rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("load", ["traction", "displacement", "follower"])
+def test_single_load_cases_add_up_to_all_of_them(load: str) -> None:
+    block = Block(**SMALL, load=load, cases=3, derivatives="hand")
+    p = near_start(block)
+    state, n = Model(block).solve(p), block.n_state // 3
+    for case, single in enumerate(block.load_cases()):
+        np.testing.assert_allclose(Model(single).solve(p).u, state.u[case * n : (case + 1) * n], atol=1e-12)
+    assert sum(Model(single).value(p) for single in block.load_cases()) == pytest.approx(state.J, rel=1e-10)
+
+
+def test_a_plane_holds_the_facets_within_a_millionth_of_the_diameter() -> None:
+    """Facets whose farthest node is at 0.9e-6 and at 1.1e-6 of the diameter from the plane."""
+    mesh = box_mesh("box", "hex8", (1, 1, 1), (3.0, 4.0, 12.0))  # its diagonal is 13 m
+    at = [12.0 + sign * factor * 13e-6 for factor in (0.9, 1.1) for sign in (-1, 1)]
+    for z in at[:2]:
+        assert mesh.boundary(f"z={z!r}").cells.tolist() == [0]
+    for z in at[2:]:
+        with pytest.raises(InputError, match="no facet of the surface lies on z="):
+            mesh.boundary(f"z={z!r}")
+    with pytest.raises(InputError, match="no facet"):  # the side faces touch the plane with one edge only
+        mesh.boundary("z=6")
+
+
 @pytest.mark.parametrize("where", ["top", "right", "z=1"])
 def test_markers_read_what_the_shape_functions_say(where: str) -> None:
     """A displacement that is affine in X is read exactly at every marker; in-plane leaves the normal out."""
     for element in ("hex8", "tet4", "tet10"):
         block = Block(**SMALL, element=element, markers=7, face=where, components="in-plane", seed=3)
         H = np.array([[0.1, 0.2, 0.3], [0.0, -0.1, 0.4], [0.2, 0.1, 0.5]])
-        U, probes = block.body.geometry.X @ H.T, block.data.probes
+        U, probes = block.mesh.geometry.X @ H.T, block.data.probes
         np.testing.assert_allclose(probes.read(U[probes.nodes]), probes.x @ H.T, atol=1e-14)
         normal = 0 if where == "right" else 2
         np.testing.assert_allclose(probes.x[:, normal], 1.0, atol=1e-14)
-        assert probes.seen.sum(axis=0).tolist() == [0 if i == normal else 7 for i in range(3)]
+        assert probes.measured.sum(axis=0).tolist() == [0 if i == normal else 7 for i in range(3)]
 
 
 def test_measured_points_need_not_be_nodes_nor_whole(tmp_path: Path) -> None:
@@ -157,8 +207,8 @@ def test_measured_points_need_not_be_nodes_nor_whole(tmp_path: Path) -> None:
     path.write_text("x,y,z,ux,uy,uz\n0.3,0.4,1,0.01,,0.2\n1,1,1,,,0.1\n")
     block = Block(**SMALL, data=str(path))
     probes = block.data.probes
-    assert probes.seen.tolist() == [[True, False, True], [False, False, True]]
-    U = block.body.geometry.X @ np.diag([0.1, 0.2, 0.3])
+    assert probes.measured.tolist() == [[True, False, True], [False, False, True]]
+    U = block.mesh.geometry.X @ np.diag([0.1, 0.2, 0.3])
     np.testing.assert_allclose(probes.read(U[probes.nodes]), [[0.03, 0.08, 0.3], [0.1, 0.2, 0.3]], atol=1e-14)
 
 
@@ -233,6 +283,20 @@ def test_bad_data_files_say_where(text: str, says: str, tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_points_outside_a_mesh_are_refused_with_the_box_of_the_mesh(tmp_path: Path) -> None:
+    """A point may be outside by a thousandth of the diameter, 13 m, and no more."""
+    mesh = box_mesh("block", "hex8", (1, 1, 1), (3.0, 4.0, 12.0))
+    moved = replace(mesh, geometry=replace(mesh.geometry, X=mesh.geometry.X + np.array([10.0, 20.0, 30.0])))
+    path = tmp_path / "d.csv"
+    path.write_text("x,y,z,ux,uy,uz\n11,22,42.012,0,0,1\n")
+    points, _ = read_probes(moved, str(path))
+    np.testing.assert_allclose(points.read(moved.geometry.X[points.nodes]), [[11.0, 22.0, 42.012]], rtol=1e-12)
+    path.write_text("x,y,z,ux,uy,uz\n11,22,42.012,0,0,1\n11,22,42.014,0,0,1\n")
+    says = "data row 2 at (11, 22, 42.014) lies outside block, whose box of 3, 4, 12 m begins at (10, 20, 30) (1 of 2"
+    with pytest.raises(InputError, match=re.escape(says)):
+        read_probes(moved, str(path))
+
+
 def test_data_a_thousand_times_off_are_warned_of(tmp_path: Path) -> None:
     path = tmp_path / "d.csv"
     path.write_text("x,y,z,ux,uy,uz\n0.5,0.5,1,0,0,200\n")
@@ -249,18 +313,16 @@ def test_data_a_thousand_times_off_are_warned_of(tmp_path: Path) -> None:
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [1 / 3, 1 / 3, 1 / 3], "flat, inside out"),
     ],
 )
-def test_meshes_that_are_none_are_refused(
-    kind: str, cells: list, moved: list | None, says: str, tmp_path: Path
-) -> None:
+def test_invalid_meshes_are_refused(kind: str, cells: list, moved: list | None, says: str, tmp_path: Path) -> None:
     X = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], dtype=float)
     X[4] = X[4] if moved is None else moved
     path = tmp_path / "mesh.vtu"
     Mesh(X, [(kind, np.array(cells))]).write(path)
     if says:
         with pytest.raises(InputError, match=says):
-            bodies.read("block", path)
+            read_mesh("block", path)
     else:
-        assert bodies.read("block", path).geometry.metric[1].sum() == pytest.approx(0.5)
+        assert read_mesh("block", path).geometry.metric[1].sum() == pytest.approx(0.5)
 
 
 def test_elements_inside_out_bear_nothing_in_real_and_complex_arithmetic() -> None:
@@ -272,8 +334,8 @@ def test_elements_inside_out_bear_nothing_in_real_and_complex_arithmetic() -> No
             P = jax.jit(gradient(law.W, 0))
             for dtype in (float, complex):
                 assert not np.isfinite(P(F.astype(dtype), q)).all(), law.name
-            if law.hand is not None:
-                assert not np.isfinite(law.hand.P(F[None] + 0j, tuple(np.ones((len(q), 1))))).all()
+            if law.numpy is not None:
+                assert not np.isfinite(law.numpy.P(F[None] + 0j, tuple(np.ones((len(q), 1))))).all()
 
 
 def test_a_shape_that_folds_a_cell_is_refused() -> None:
@@ -288,7 +350,7 @@ def test_points_in_distorted_and_in_flat_cells_are_found() -> None:
     """x = sum_a N_a(xi) X_a in the cell that is named, whatever its neighbours' maps do out there."""
     rng = np.random.default_rng(0)
     for element, size in (("hex8", (1.0, 1.0, 1.0)), ("tet4", (1.0, 1.0, 20.0)), ("tet10", (20.0, 1.0, 0.05))):
-        body = bodies.box("box", element, (4, 4, 4), size)
+        body = box_mesh("box", element, (4, 4, 4), size)
         geometry = body.geometry
         if element == "hex8":
             inside = ((geometry.X > 0.0) & (geometry.X < 1.0)).all(axis=1)
@@ -301,8 +363,24 @@ def test_points_in_distorted_and_in_flat_cells_are_found() -> None:
         assert outside.max() < 1e-9
 
 
+def test_points_in_the_bulge_of_a_curved_side_are_found() -> None:
+    """An edge through y = 0, -0.2, -0.16 reaches -0.2133, outside the box of its nodes; another cell is nearer."""
+    element = Element("tet10")
+    curved = element.basis.doflocs.copy()
+    curved[np.flatnonzero((curved == [1.0, 0.0, 0.0]).all(axis=1)), 1] = -0.16
+    curved[np.flatnonzero((curved == [0.5, 0.0, 0.0]).all(axis=1)), 1] = -0.2
+    xi = np.array([2 / 3, 1e-3, 1e-3])
+    x = element.shape_functions(xi)[0] @ curved
+    assert x[1] < curved[:, 1].min() - 0.01
+    X = np.concatenate([curved, x - [0.0, 0.1, 0.0] + 0.02 * element.basis.doflocs])
+    cells, found, outside = Geometry(element, np.arange(20).reshape(2, 10), X).locate(x[None])
+    assert cells.tolist() == [0]
+    np.testing.assert_allclose(found, [xi], atol=1e-9)
+    assert outside[0] < 0.0
+
+
 def test_meshes_in_two_parts_and_of_two_kinds_are_refused(tmp_path: Path) -> None:
-    box = bodies.box("box", "hex8", (1, 1, 1), (1.0, 1.0, 1.0))
+    box = box_mesh("box", "hex8", (1, 1, 1), (1.0, 1.0, 1.0))
     name, cells = box.geometry.for_meshio()
     X = np.concatenate([box.geometry.X, box.geometry.X + np.array([0, 0, 1])])
     two = tmp_path / "two.vtu"
@@ -321,7 +399,7 @@ def test_meshes_in_two_parts_and_of_two_kinds_are_refused(tmp_path: Path) -> Non
 
 def test_the_origin_of_a_mesh_does_not_loosen_the_solve(tmp_path: Path) -> None:
     here, there = (str(tmp_path / f"{name}.vtu") for name in ("here", "there"))
-    box = bodies.box("box", "hex8", (2, 2, 2), (1.0, 1.0, 1.0))
+    box = box_mesh("box", "hex8", (2, 2, 2), (1.0, 1.0, 1.0))
     name, cells = box.geometry.for_meshio()
     for path, shift in ((here, 0.0), (there, 1e4)):
         Mesh(box.geometry.X + shift, [(name, cells)]).write(path)
@@ -330,7 +408,7 @@ def test_the_origin_of_a_mesh_does_not_loosen_the_solve(tmp_path: Path) -> None:
     assert relative_error(other.u, one.u) < 1e-10  # eps times the shift in positions
 
 
-def test_a_twin_at_its_truth_has_no_gradient_and_nobody_says_it_is_wrong(cli) -> None:
+def test_a_zero_gradient_at_the_truth_gets_no_warning(cli) -> None:
     command = "run --json --no-store --min-time 0 --problem block[n=2,data=twin] --at true --route adjoint"
     (row,) = cli(*command.split()).rows
     assert row["gradient_error"] < 1e-9

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import relative_error, somewhere, zoo
@@ -80,6 +82,15 @@ def test_total_variation_charges_a_jump_by_its_height_alone() -> None:
     tv, tikhonov = Prior(1.0, "tv", 1e-9), Prior(1.0, "tikhonov")
     assert tv.value(np, steep) == pytest.approx(tv.value(np, spread), rel=1e-8)
     assert tikhonov.value(np, steep) > 2.9 * tikhonov.value(np, spread)
+
+
+@pytest.mark.parametrize(
+    "make", [Bar, lambda **options: Block(n=2, **options), lambda **options: Advection(n=2, **options)]
+)
+def test_total_variation_is_rounded_below_jumps_of_one_percent(make) -> None:
+    """Phi of one jump j by default: sqrt(j^2 + 0.01^2) - 0.01."""
+    prior = replace(make(alpha=1.0, phi="tv").regularization, pairs=None)
+    assert prior.value(np, np.array([0.0, 0.03])) == pytest.approx(np.hypot(0.03, 0.01) - 0.01, rel=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import sys
 from rich.console import Console, ConsoleOptions
 from rich.measure import Measurement
 from rich.table import Table
+from rich.text import Text
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import selector_of
@@ -28,6 +29,11 @@ def console(stderr: bool = False) -> Console:
     width = None if stream.isatty() or "COLUMNS" in os.environ else PIPED_WIDTH
     # the stream of this moment, whatever sys.stdout becomes; selectors contain brackets, which are not markup
     return Terminal(file=stream, width=width, highlight=False, emoji=False, markup=False)
+
+
+def say(out: Console, text: str, style: str = "") -> None:
+    """Print a line, wrapped between words in a terminal and whole in a pipe."""
+    out.print(Text(text, style=style), soft_wrap=not out.is_terminal)
 
 
 def show(out: Console, table: Table | TextTable) -> None:

@@ -1,4 +1,4 @@
-"""`routes run`: gradients by every route named on every problem named, what they cost and how wrong they are."""
+"""`routes run`: the gradient by every route on every problem named, its cost and its error."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -37,18 +36,18 @@ if TYPE_CHECKING:
 
 Only = Literal["missing", "failed", "stale", "all"]
 SHOWN = "-"  # --gradient without a file
-GRADIENT = "Show the gradient parameter by parameter beside its reference; with a file, write that as CSV instead."
-COMPONENTS = "Only so many components of dJ/dp, drawn at random: the bill of each, and its error."
-DIRECTIONS = "Only the slopes of J along so many random directions."
-VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView; for one problem and one route."
-SENSITIVITIES = "Write du/dp as FILE.csv, FILE.npz or FILE.vtu; for one problem and --route tangent."
-OF = "Of the state, du/dp, or of the data, d(S u)/dp."
-COLUMNS = "Parameters whose columns of du/dp are written, also to --vtu: 1,5-8. [all; none to --vtu]"
-BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
-TIMING = "Without, gradients are computed and judged, their work counted and memory read, but not timed."
-RESUME = "Only cases that the store lacks, that failed, or whose code, data or libraries have changed."
-EXPECTED = "Failures that are known, with their reasons. [expected.toml beside the store]"
-ONLY = "The same for cases of one kind; all: each again."
+GRADIENT = "Show every component of the gradient beside its reference; with FILE.csv, write them there instead."
+COMPONENTS = "Compute only M components of dJ/dp, drawn at random."
+DIRECTIONS = "Compute only the slopes of J along M random directions."
+VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView. For one problem and one route."
+SENSITIVITIES = "Write du/dp to FILE.csv, FILE.npz or FILE.vtu. For one problem and --route tangent."
+OF = "Sensitivities of the state, du/dp, or of the data, d(S u)/dp."
+COLUMNS = "Parameters to write du/dp for, by number, as 1,5-8; also written to --vtu. [all; in --vtu none]"
+BUDGET = "Skip gradients predicted to take longer [s] or to need more memory than there is; inf: skip none."
+TIMING = "Time the gradients; errors, counted work and memory are measured in any case."
+RESUME = "Run only cases that are missing in the store, failed, or stale: code, data or libraries changed."
+EXPECTED = "File of known failures and their reasons. [expected.toml beside the store]"
+ONLY = "Run only cases of one of these kinds; all: run every case again."
 
 
 @click.command()
@@ -56,12 +55,12 @@ ONLY = "The same for cases of one kind; all: each again."
 @click.option("--route", "routes", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
 @at_option
 @click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
-@click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time.")
+@click.option("--min-time", type=float, default=0.1, show_default=True, help="Time each gradient for this long [s].")
 @click.option("--timing/--no-timing", "timed", default=True, show_default=True, help=TIMING)
 @solver_options
 @click.option("--components", type=int, metavar="M", help=COMPONENTS)
 @click.option("--directions", type=int, metavar="M", help=DIRECTIONS)
-@click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of --components and --directions.")
 @click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
 @click.option("--sensitivities", type=click.Path(path_type=Path), metavar="FILE", help=SENSITIVITIES)
@@ -100,13 +99,14 @@ def run(
     as_json: bool,
     kept: Path | None,
 ) -> None:
-    """Compute dJ/dp by every route named, on every problem named; say what it cost and how wrong it is.
+    """Compute dJ/dp by each route on each problem; measure its cost and its error.
 
-    Every case runs in a process of its own; the routes on one problem are timed in turn, a forward solve beside every
-    sample. What goes wrong is a row with its reason.
+    Every case (one route on one problem) runs in a process of its own. The routes on one problem are timed in turns,
+    each sample followed by a sample of forward solves. A case that fails is a row that gives the reason. Rows are
+    printed in the order of the command line.
 
-    Exit code: 0 all ok, skipped or failed as expected, 1 a case failed (its row says why), 2 wrong usage,
-    130 interrupted.
+    Exit code: 0 if every case is ok, skipped or failed as expected, 1 if a case failed, 2 for wrong usage, 130 if
+    interrupted.
     """
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.partial import chosen
@@ -114,6 +114,7 @@ def run(
     from gradient_routes.bench.execution.isolation.signals import Interrupt, interruptible
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.store import Store
+    from gradient_routes.bench.studies.bill.done import Done
     from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
     from gradient_routes.bench.studies.bill.sensitivity_files import wanted as columns_wanted
 
@@ -141,16 +142,16 @@ def run(
         store.check_writable()
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
     done = Done(store, as_json, known, views=gradient is not None or files.fields)
-    interruptible()  # SIGTERM ends it like Ctrl-C: with a table
+    interruptible()  # SIGTERM acts like Ctrl-C
     try:
-        with closing(outcomes):  # whatever interrupts, cases under way are ended first
+        with closing(outcomes):  # an interrupt ends cases under way first
             for outcome in with_progress(outcomes, count):
-                with Interrupt() as interrupt:  # a row that is finished is kept whole
+                with Interrupt() as interrupt:  # held back until the row is stored
                     done.take(outcome)
                 interrupt.heard()
     except KeyboardInterrupt:
         raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
-    finally:  # an interrupt leaves what was measured on the screen, too
+    finally:  # after an interrupt, too
         done.show(gradients=gradient == SHOWN)
         said, failed = files.write(done.ordered)
         for line in said:
@@ -165,64 +166,6 @@ def run(
         click.echo("".join(outcome.row["traceback"] or "" for outcome in done.outcomes), err=True, nl=False)
     if done.failures:
         raise click.exceptions.Exit(1)
-
-
-class Done:
-    """Outcomes as they come: kept, printed, and what of them the end still needs."""
-
-    def __init__(self, store: Store | None, as_json: bool, known: Sequence[Expectation], views: bool) -> None:
-        self.store, self.as_json, self.known, self._views = store, as_json, known, views
-        self.outcomes: list[Outcome] = []
-        self.lost: list[str] = []
-        self._waiting: dict[int, Row] = {}  # by their place: rows that come before the next to print
-        self._next = 0
-
-    def take(self, outcome: Outcome) -> None:
-        """Keep a row at once; print it, as JSON, once all rows before it are printed."""
-        try:
-            if self.store is not None:
-                self.store.append(outcome.row, outcome.samples, outcome.environment)
-        except InputError as error:  # a full disk, a lock: the row is printed all the same
-            self.lost.append(str(error))
-        self._waiting[outcome.place] = outcome.row
-        while self._next in self._waiting:
-            self._print(self._next)
-            self._next += 1
-        slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
-        self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
-
-    def _print(self, place: int) -> None:
-        from gradient_routes.bench.cases.row import as_json
-
-        row = self._waiting.pop(place)
-        if self.as_json:
-            click.echo(as_json(row))
-
-    def show(self, gradients: bool) -> None:
-        """The table in the order asked for, and gradients where those were asked for; rows of JSON that still wait."""
-        from gradient_routes.bench.studies.bill.view import show
-
-        for place in sorted(self._waiting):
-            self._print(place)
-        if self.as_json:
-            return
-        views = [(o.row, o.view) for o in self.ordered if o.view is not None and gradients]
-        kept = None if self.store is None or self.lost else self.store.path
-        show([o.row for o in self.ordered], views, kept, self.known)
-
-    @property
-    def ordered(self) -> list[Outcome]:
-        """The outcomes in the order asked for."""
-        return sorted(self.outcomes, key=lambda outcome: outcome.place)
-
-    @property
-    def failures(self) -> list[Row]:
-        """Those that nobody expected."""
-        from gradient_routes.bench.cases.expected import as_expected
-        from gradient_routes.bench.cases.row import ANSWERED
-
-        rows = [o.row for o in self.outcomes if o.row["status"] not in ANSWERED]
-        return [row for row in rows if not as_expected(row, self.known)]
 
 
 def _expectations(named: Path | None, kept: Path | None) -> tuple[Expectation, ...]:
@@ -248,13 +191,13 @@ def _wanted(
 
 
 def _resumed() -> str:
-    """This command again, for what is left."""
+    """This command with --resume."""
     given = [word for word in sys.argv[1:] if word != "--resume"]
     return shlex.join(["routes", *given, "--resume"])
 
 
 def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:
-    """A progress bar on a terminal for more than one case, nothing of the kind elsewhere."""
+    """Show a progress bar for more than one case, if the output is a terminal."""
     if count < 2 or not (sys.stderr.isatty() and sys.stdout.isatty()):
         yield from outcomes
         return

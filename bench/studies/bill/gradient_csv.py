@@ -1,4 +1,4 @@
-"""--gradient FILE: gradients parameter by parameter, as one CSV file."""
+"""--gradient FILE.csv: gradients component by component."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ AXES = ("x", "y", "z")
 
 
 def write(path: Path, views: Sequence[tuple[Row, View]]) -> None:
-    """One line a parameter: problem, route, parameter, unit, x, y, z as far as positions go, p, dJ_dp, reference.
-
-    Raises OSError.
+    """Write a line per parameter: problem, route, parameter, unit, its position (x, y, z as far as known), p, dJ_dp,
+    reference. Raises OSError.
     """
     d = max((v.position.shape[1] for _, v in views if v.position is not None), default=0)
     with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.cases.column import Row
@@ -20,7 +18,7 @@ from gradient_routes.bench.execution.isolation.stack import without
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
-from gradient_routes.bench.render.terminal.tables import MANY, RESOLUTION, named, titled
+from gradient_routes.bench.render.terminal.tables import MANY, RESOLUTION, named, say, titled
 from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.routes.tally import Work
 
@@ -46,16 +44,17 @@ def show(
         return
     out = tables.console()
     tables.show(out, results(rows))
-    for line in remarks(rows):
-        out.print(line, soft_wrap=not out.is_terminal)
+    for line, style in remarks(rows):
+        say(out, line, style)
     for row in rows:
         verdict = judged(row, known)
         if verdict is not None:
-            out.print(f"{titled(row)}: {row['route']}: {verdict.says}", style="yellow", soft_wrap=True)
+            say(out, f"{titled(row)}: {row['route']}: {verdict.says}", "yellow")
     if kept is not None:
-        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
+        say(out, f"kept in {kept}", "dim")
     for row, view in views:
         out.print()
+        say(out, f"{titled(row)} by {named('route', row)}", "bold")
         tables.show(out, gradient(row, view))
 
 
@@ -110,11 +109,10 @@ def _work(work: dict[str, int] | None) -> str:
     return "" if work is None else summary(Work(**work))
 
 
-def remarks(rows: Sequence[Row]) -> list[Text]:
-    """The legend, other references, reasons of skipped and failed cases, then notes, each once."""
+def remarks(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Lines and their styles: the legend, other references, reasons of skipped and failed cases, notes, each once."""
     legend = LEGEND.format(UNSTABLE if any(row["unstable"] for row in rows) else "")
-    below = dict.fromkeys([*_references(rows), *_reasons(rows), *_notes(rows)])
-    return [Text(legend, style="dim"), *(Text(line, style=style) for line, style in below)]
+    return [(legend, "dim"), *dict.fromkeys([*_references(rows), *_reasons(rows), *_notes(rows)])]
 
 
 def _references(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
@@ -146,31 +144,24 @@ def _notes(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield f"note: {named('problem', row)}: {note}", "italic"
 
 
-def gradient(row: Row, view: View) -> Table:
-    """Parameter by parameter: the route's gradient beside the reference and what the problem adds."""
-    title = f"{titled(row)} by {named('route', row)}"
-    table = Table(box=None, pad_edge=False, title=Text(title), title_justify="left", title_style="bold")
-    reference = view.reference
-    table.add_column("p", no_wrap=True)
-    table.add_column("dJ/dp", justify="right", style=route_style(row["route"]))
-    if reference is not None:
-        table.add_column(Text(reference.name), justify="right")
-    for name in view.columns.columns:
-        table.add_column(Text(name), justify="right", overflow="fold")
+def gradient(row: Row, view: View) -> TextTable:
+    """A row per parameter: the route's gradient beside the reference and the columns of the problem."""
+    columns = {"dJ/dp": view.gradient}
+    columns |= {} if view.reference is None else {view.reference.name: view.reference.gradient}
+    columns |= view.columns.columns
     blind = view.columns.blind
-    if blind is not None:
-        table.add_column("")
+    marks = [] if blind is None else [""]
+    table = TextTable(["p", *columns, *marks], frozenset(range(1, 1 + len(columns))))
     n = len(view.labels)
     shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
     for i in shown:
         if i is None:
-            table.add_row(f"... {n - MANY} more", style="dim")
+            table.row(Text(f"... {n - MANY} more", style="dim"), [Text("")] * (len(columns) + len(marks)))
             continue
-        values: list[Any] = [view.gradient[i]]
-        values += [] if reference is None else [reference.gradient[i]]
-        values += [column[i] for column in view.columns.columns.values()]
-        mark = [] if blind is None else [view.columns.mark if blind[i] else ""]
-        hidden = blind is not None and blind[i]
-        label = Text(f"{view.labels[i]} [{view.units[i]}]")
-        table.add_row(label, *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
+        hidden = blind is not None and bool(blind[i])
+        style = "dim" if hidden else ""
+        cells = [Text(f"{values[i]:.6g}", style=style) for values in columns.values()]
+        cells[0].style = style or route_style(row["route"])
+        cells += [Text(view.columns.mark if hidden else "", style=style) for _ in marks]
+        table.row(Text(f"{view.labels[i]} [{view.units[i]}]", style=style), cells)
     return table

@@ -1,4 +1,4 @@
-"""--vtu FILE: u, lambda and dJ/dp on the mesh, for ParaView."""
+"""--vtu FILE.vtu: u, lambda and dJ/dp on the mesh, for ParaView."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gradient_routes.problems.problem import Fields
 
 
 def write(path: Path, fields: Fields) -> None:
-    """The fields as a VTK unstructured grid. Raises OSError, and InputError for fields that are no mesh."""
+    """Write a VTK unstructured grid. Raises OSError, and InputError for fields that do not fit the mesh."""
     from meshio import Mesh, WriteError
 
     cell_data = {name: [values] for name, values in fields.cell_data.items()}
@@ -17,4 +17,4 @@ def write(path: Path, fields: Fields) -> None:
         mesh = Mesh(fields.points, [(fields.cell_type, fields.cells)], dict(fields.point_data), cell_data)
         mesh.write(path, file_format="vtu")
     except (WriteError, ValueError, KeyError) as error:
-        raise InputError(f"--vtu {path}: no fields on a mesh: {error} - mend the problem's `fields`") from error
+        raise InputError(f"--vtu {path}: fields do not fit the mesh: {error} - correct `Problem.fields`") from error

@@ -9,8 +9,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.store.output_files import check_writable
 from gradient_routes.bench.verification.page import page
-from gradient_routes.bench.verification.result import Check
-from gradient_routes.bench.verification.rows import rows
+from gradient_routes.bench.verification.result import Check, rows
 
 LOST = 2  # exit code where the page asked for could not be written
 

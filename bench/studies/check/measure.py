@@ -9,7 +9,7 @@ from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.imported import imported
 from gradient_routes.bench.cases.study import Found, Say
 from gradient_routes.bench.studies.check.conclude import conclude, page_writable
-from gradient_routes.bench.studies.options import built, one_problem, one_route
+from gradient_routes.bench.studies.options import one_route, problem_at
 from gradient_routes.bench.verification import foreign
 from gradient_routes.bench.verification.check import accepted, check
 from gradient_routes.bench.verification.contract import of_problem, of_route
@@ -56,7 +56,7 @@ def run(
 
 def _contract(say: Say, problem: str | None, route: str | None, at: str, solver: Solver) -> int:
     """A problem alone with all routes, or a route alone on the bar."""
-    made, p = built(one_problem(problem or "bar"), at)
+    made, p = problem_at(problem or "bar", at)
     with stdout_to_stderr():
         if route is not None:
             spec = one_route(route)
@@ -78,7 +78,7 @@ def _subject(
 ) -> Subject:
     if problem is not None and route is not None:
         spec = one_route(route)
-        made, p = built(one_problem(problem), at)
+        made, p = problem_at(problem, at)
         return subject(made, spec.route, spec.options, p, solver)
     if at == "true":
         raise InputError("check: --at true is for registered problems with synthetic data - give a file")

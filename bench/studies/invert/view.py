@@ -14,6 +14,7 @@ from gradient_routes.bench.inversion.history import Iterate
 from gradient_routes.bench.inversion.invert import Inversion
 from gradient_routes.bench.inversion.one_shot import OneShot
 from gradient_routes.bench.render.format import number, seconds
+from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.studies.invert import lcurve_view
@@ -21,7 +22,7 @@ from gradient_routes.bench.studies.invert.measure import Begun, Compared, Ended,
 from gradient_routes.problems.problem import Array
 
 WIDEST = 100  # columns of a plot
-WIDTHS = {"k": 4, "J": 10, "misfit": 10, "alpha Phi": 10, "|dJ/dp|": 9, "|step|": 8, "fwd": 5, "adj": 5, "time": 8}
+WIDTHS = {"k": 4, "J": 9, "misfit": 9, "alpha Phi": 9, "|dJ/dp|": 9, "|step|": 8, "fwd": 4, "adj": 4, "time": 8}
 HEADINGS = " ".join(name.rjust(width) for name, width in WIDTHS.items())
 LEGEND = (
     "fwd, adj: forward solves, and linearized or transposed ones, so far; |step|: in natural changes of p;"
@@ -50,8 +51,8 @@ def show(out: Console, found: object, plots: bool = True) -> None:
             out.print()
             if plots:
                 out.print(history(inversions, width))
-            out.print(costs(inversions))
-            out.print(LEGEND, style="dim", soft_wrap=True)
+            tables.show(out, costs(inversions))
+            tables.say(out, LEGEND, "dim")
             _estimates(out, inversions[-1])
         case LCurve(points, best):
             if plots:
@@ -71,7 +72,7 @@ def show(out: Console, found: object, plots: bool = True) -> None:
 
 def _estimates(out: Console, found: Inversion) -> None:
     out.print()
-    out.print(estimates(found))
+    tables.show(out, estimates(found))
     picture = cells(found)
     if picture:
         out.print(picture)
@@ -85,9 +86,9 @@ def line(out: Console, step: Iterate) -> None:
     """One iteration, as soon as it is known."""
     off = "" if step.distance is None else f" {step.distance:>7.3g}"
     text = (
-        f"{step.iteration:>4} {step.objective:>10.4g} {step.misfit:>10.4g} {step.regularization:>10.3g}"
-        f" {step.gradient_norm:>9.3g} {number(step.step_length) or '':>8} {step.forward_solves:>5}"
-        f" {step.adjoint_solves:>5} {seconds(step.seconds):>8}{off}"
+        f"{step.iteration:>4} {step.objective:>9.4g} {step.misfit:>9.4g} {step.regularization:>9.3g}"
+        f" {step.gradient_norm:>9.3g} {number(step.step_length) or '':>8} {step.forward_solves:>4}"
+        f" {step.adjoint_solves:>4} {seconds(step.seconds):>8}{off}"
     )
     out.print(Text(text))
     if step.says:
@@ -139,7 +140,7 @@ def _cost(found: Inversion, level: float) -> str:
 def estimates(found: Inversion) -> Table:
     """Parameter by parameter: start, estimate, truth, the gradient that is left, beside it what the problem shows (of
     the bar the two strains it is the product of); blind ones hatched."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold", title_justify="left")
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold", title_justify="left")
     table.title = Text(found.label, style="bold")
     q = found.made.parameters
     beside = {name: column for name, column in found.view.columns.items() if name not in COORDINATES}

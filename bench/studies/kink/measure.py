@@ -23,7 +23,7 @@ from gradient_routes.bench.studies.kink.event import NEAR, Event, Kink, Side, Sl
 from gradient_routes.bench.studies.kink.ray import Gradients, Ray, bisect
 from gradient_routes.bench.studies.kink.rounding import GRADIENTS, Trade, is_rounded, trade, yielding
 from gradient_routes.bench.studies.kink.rows import rows
-from gradient_routes.bench.studies.options import built, one_problem, routes_of
+from gradient_routes.bench.studies.options import problem_at, routes_of
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Offers, Problem
 from gradient_routes.routes.model import Model
@@ -58,7 +58,7 @@ def run(
         raise InputError(f"--points {points} - give at least 2")
     checked(budget)
     specs = routes_of(routes or ["all"], say)
-    ray = Ray(*built(one_problem(selector), at), solver)
+    ray = Ray(*problem_at(selector, at), solver)
     failure = traded = None
     with np.errstate(all="ignore"):
         swept = kink(ray, specs, np.geomspace(low, high, points).tolist(), budget)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.studies.kink.ray import Gradients, Ray, bisect
 from gradient_routes.problems.bar import Bar
-from gradient_routes.problems.contact import Compliant, Penalty, Quadratic, Rigid, Softplus
+from gradient_routes.problems.contact import CompliantStop, Penalty, Quadratic, RigidStop, Softplus
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Problem
 
@@ -32,7 +32,7 @@ class Traded:
     iterations     Newton steps
     """
 
-    stop: Compliant
+    stop: CompliantStop
     s: float
     penetration: float | None = None
     objective: float | None = None
@@ -58,12 +58,12 @@ class Trade:
         return list(dict.fromkeys(row.s for row in self.rows))
 
 
-def yielding(problem: Problem) -> Compliant | None:
+def yielding(problem: Problem) -> CompliantStop | None:
     """The stop of a bar that gives way, or None."""
-    return problem.stop if isinstance(problem, Bar) and isinstance(problem.stop, Compliant) else None
+    return problem.stop if isinstance(problem, Bar) and isinstance(problem.stop, CompliantStop) else None
 
 
-def width_of(stop: Compliant) -> float | None:
+def width_of(stop: CompliantStop) -> float | None:
     """[m], None of the penalty, which has none."""
     return stop.law.width if isinstance(stop.law, Softplus | Quadratic) else None
 
@@ -74,7 +74,7 @@ def is_rounded(problem: Problem) -> bool:
     return stop is not None and width_of(stop) is not None
 
 
-def variants(stop: Compliant) -> list[Compliant]:
+def variants(stop: CompliantStop) -> list[CompliantStop]:
     """Over decades of the width, or of the stiffness of a stop that has none; the problem's own among them."""
     law = stop.law
     if isinstance(law, Penalty):
@@ -83,15 +83,15 @@ def variants(stop: Compliant) -> list[Compliant]:
     return [replace(stop, law=replace(law, width=law.width * factor)) for factor in WIDTHS]
 
 
-def trade(ray: Ray, stop: Compliant, route: RouteSpec, low: float, high: float) -> Trade:
+def trade(ray: Ray, stop: CompliantStop, route: RouteSpec, low: float, high: float) -> Trade:
     """Measure all variants of the stop; the kink of exact contact is looked for between the factors low and high.
 
     Raises what a solve of exact contact at s = 1 raises.
     """
     bar = ray.problem
     assert isinstance(bar, Bar)
-    exact = replace(ray, problem=bar.behind(Rigid(stop.gap)))
-    rays = [(one, replace(ray, problem=bar.behind(one))) for one in variants(stop)]
+    exact = replace(ray, problem=bar.with_stop(RigidStop(stop.gap)))
+    rays = [(one, replace(ray, problem=bar.with_stop(one))) for one in variants(stop)]
 
     def compared(s: float, sides: Sequence[float]) -> list[Traded]:
         J, gradients = exact.objective(s), Gradients(exact, route)
@@ -105,7 +105,7 @@ def trade(ray: Ray, stop: Compliant, route: RouteSpec, low: float, high: float) 
     return Trade(ray, route, (*compared(1.0, [1.0]), *compared(event, sides)), event)
 
 
-def against(ray: Ray, stop: Compliant, route: RouteSpec, s: float, J: float, slopes: Sequence[float]) -> Traded:
+def against(ray: Ray, stop: CompliantStop, route: RouteSpec, s: float, J: float, slopes: Sequence[float]) -> Traded:
     """One variant at s against J and dJ/ds of exact contact."""
     gradients, width = Gradients(ray, route), width_of(stop)
     try:

@@ -27,11 +27,12 @@ from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, norm
 from gradient_routes.routes.route import Options, Result, Route
-from gradient_routes.routes.solvers.factorization import LinearSolver
+from gradient_routes.routes.solvers.iterative import descent, krylov
+from gradient_routes.routes.solvers.registry import linear_solver as named
 
 Swept = Literal["forward", "adjoint", "both"]
 TIGHT = 1e-12  # tolerance of the solves that are not swept
-NOT_SHARED = ("definite", "interrupted", "points")  # by rows
+NOT_SHARED = ("jumps", "interrupted", "points")  # by rows
 FEW = 32  # unknowns up to which conjugate gradients are exact before they are accurate
 
 
@@ -86,7 +87,7 @@ class Point:
 class Tolerance:
     """The study: its points and what they share.
 
-    definite     R_u is positive definite: descent ends on it
+    jumps        R_u is positive definite, so that steepest descent would converge, and the solver is a less even one
     interrupted  by Ctrl-C, after these points
     """
 
@@ -97,7 +98,7 @@ class Tolerance:
     sweep: str
     n_state: int
     n_param: int
-    definite: bool = field(repr=False)
+    jumps: bool = field(repr=False)
     interrupted: bool = field(repr=False)
     points: tuple[Point, ...] = field(repr=False)
 
@@ -120,7 +121,7 @@ def run(
     sweep: Swept | None,
     rtol: float | None,
     adjoint_rtol: float | None,
-    linear_solver: LinearSolver | None,
+    linear_solver: str | None,
     budget: float,
     kept: Path | None = None,
 ) -> None:
@@ -159,7 +160,7 @@ def tolerance(
     routes: Sequence[RouteSpec],
     sweep: Sweep,
     at: str = "start",
-    linear_solver: LinearSolver | None = None,
+    linear_solver: str | None = None,
     budget: float = 60.0,
 ) -> Tolerance:
     """Every route at every tolerance, judged by what is found directly at a tight one.
@@ -188,23 +189,23 @@ def tolerance(
         sweep.name,
         bench.problem.n_state,
         len(bench.p),
-        bench.problem.structure == "spd",
+        bench.problem.structure == "spd" and not named(linear_solver).gradual,
         interrupted,
         tuple(points),
     )
 
 
-def default_solver(problem: Problem) -> LinearSolver:
+def default_solver(problem: Problem) -> str:
     """One whose tolerance means something: on a linear problem a direct solver is exact after one step."""
     if not problem.linear:
-        return "auto"
-    return "descent" if problem.n_state <= FEW else "krylov"
+        return Solver.linear_solver
+    return descent.name if problem.n_state <= FEW else krylov.name
 
 
 class Experiment:
     """One problem at one p under a sweep."""
 
-    def __init__(self, bench: Bench, sweep: Sweep, linear_solver: LinearSolver, budget: float) -> None:
+    def __init__(self, bench: Bench, sweep: Sweep, linear_solver: str, budget: float) -> None:
         self.bench, self.problem, self.p = bench, bench.problem, bench.p
         self.sweep, self.linear_solver, self.budget = sweep, linear_solver, budget
         self._priced: Prices | None = None
@@ -224,7 +225,7 @@ class Experiment:
 
     def _alike(self, spec: RouteSpec) -> Options:
         """Left open, the iteration that unrolled AD differentiates is as slow as the solver's, where there is one."""
-        if self.linear_solver != "descent" or spec.options.get("inner", "") is not None:
+        if not named(self.linear_solver).gradual or spec.options.get("inner", "") is not None:
             return spec.options
         options = spec.options | {"inner": "richardson"}
         return options if spec.route.objection(self.problem, **options) is None else spec.options

@@ -41,7 +41,7 @@ def show(out: Console, done: Tolerance, plotted: bool = True) -> None:
         out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)
-    for line in remarks(rows, done.definite):
+    for line in remarks(rows, done.jumps):
         out.print(line, soft_wrap=not out.is_terminal)
 
 
@@ -113,7 +113,7 @@ def _cell(row: Row) -> str:
     return (number(row["gradient_error"], 2) or "unknown") if row["status"] == "ok" else row["status"]
 
 
-def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
+def remarks(rows: Sequence[Row], jumps: bool = False) -> list[Text]:
     """Reasons of what was skipped, and of what failed at which tolerances."""
     at: dict[tuple[str, str, str], list[float]] = {}
     for row in rows:
@@ -128,7 +128,7 @@ def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
         )
         for (status, reason, _), where in at.items()
     ]
-    slowly = SLOWLY if definite and rows[0]["linear_solver"] != "descent" else ""
+    slowly = SLOWLY if jumps else ""
     return lines + ([Text(f"note: {JUMPED}{slowly}", style="italic")] if _jumped(rows) else [])
 
 

@@ -10,7 +10,7 @@ from gradient_routes.bench.cases.study import Say
 from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import price_of
 from gradient_routes.bench.studies.check.conclude import conclude, page_writable
-from gradient_routes.bench.studies.options import built, one_problem, one_route
+from gradient_routes.bench.studies.options import one_route, problem_at
 from gradient_routes.bench.units import duration
 from gradient_routes.bench.verification.check import check
 from gradient_routes.bench.verification.plan import Plan
@@ -42,7 +42,7 @@ def run(
 ) -> int:
     checked(budget)
     spec = one_route(route)
-    made, p = built(one_problem(selector), at)
+    made, p = problem_at(selector, at)
     few = _default(made) if components is None else _components(components, len(p))
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     judged = subject(made, spec.route, spec.options, p, solver)

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from commands import FAULTY, Shell, ended, eventually, faulty, sigint_ignored
 
-from gradient_routes.bench.commands.group import KEEPING
-from gradient_routes.bench.execution import limited
+from gradient_routes.bench.cases.registry import studies
+from gradient_routes.bench.command_options import FINISHED
 from gradient_routes.bench.execution.isolation import process as watching
-from gradient_routes.bench.execution.limited import FINISHED
 from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies import command
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -34,7 +34,7 @@ def test_every_verb_ends_at_its_limit(started: Shell) -> None:
     running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
     for verb, process in running.items():
         ran = ended(process)
-        finished = f"; {FINISHED}" if verb in KEEPING else ""
+        finished = f"; {FINISHED}" if studies()[verb].keeps else ""
         says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less{finished}\n"
         assert (ran.code, ran.out, ran.err) == (1, "", says)
     names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
@@ -69,22 +69,18 @@ def late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         def monotonic() -> float:
             return time.monotonic() + (7200.0 if file.exists() and len(file.read_text()) > 9 else 0.0)
 
-    for module in (limited, watching):
-        monkeypatch.setattr(module, "time", Late)
+    monkeypatch.setattr(watching, "time", Late)
 
 
 @pytest.mark.parametrize("verb", ENDLESS)
-def test_what_a_verb_has_at_its_limit_is_shown_and_kept(
-    verb: str, late: None, cli, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_a_verb_has_at_its_limit_is_shown_and_kept(verb: str, late: None, cli, tmp_path: Path) -> None:
     (tmp_path / "counted.py").write_text(COUNTED)
     ran = cli(verb, "--problem", "counted.py:Counted", "--json", "--isolate", *ENDLESS[verb])
     told = f"{verb}: timeout: after 3600 s of --timeout - raise the limit, or ask for less; {FINISHED}"
     assert (ran.code, ran.err) == (1, f"routes: {told}\n")
     table = "inversion" if verb == "invert" else verb
     kept = Store(tmp_path / "results" / "routes.sqlite").records(table)
-    shown = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
-    assert sum(row["table"] == table for row in shown) == len(kept) > 0
+    assert sum(row["table"] == table for row in ran.rows) == len(kept) > 0
     assert verb != "invert" or kept[-1]["says"] == "interrupted"
 
 
@@ -150,7 +146,7 @@ def test_a_verb_that_does_not_react_is_killed_and_says_nothing_of_what_it_has(
     late: None, cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "deaf.py").write_text(COUNTED + DEAF)
-    monkeypatch.setattr(limited, "LAST", 0.5)
+    monkeypatch.setattr(command, "LAST", 0.5)
     ran = cli("invert", "--problem", "deaf.py:Deaf", "--isolate", "--no-plot", *ENDLESS["invert"])
     told = "invert: timeout: after 3600 s of --timeout - raise the limit, or ask for less"
     assert (ran.code, ran.err) == (1, f"routes: {told}\n")

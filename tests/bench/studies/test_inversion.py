@@ -60,6 +60,16 @@ def test_finite_differences_take_the_same_steps_at_the_predicted_price(bar: Inve
     np.testing.assert_allclose(by_fd.p, bar.p, atol=1e-6)
 
 
+def test_a_route_without_a_state_shows_the_strains_of_the_solution(bar: Inversion) -> None:
+    """Finite differences return no u: the strains shown are those at the estimate, not of the initial guess."""
+    by_fd = inverted("bar", "fd-central")
+    np.testing.assert_allclose(by_fd.view.columns["eps[u]"], bar.view.columns["eps[u]"], rtol=1e-6)
+    assert (bar.view.columns["eps[u]"] > 0.0).all()
+    closed = "bar[stop=penalty,gap=0.5]"
+    one, other = (inverted(closed, route, limits=Limits(2, 0.0)) for route in ("adjoint", "fd-central"))
+    assert one.view.blind.tolist() == other.view.blind.tolist() == [False] * 8, "all moduli act on a closed stop"
+
+
 def test_a_trust_region_shows_steps_that_it_takes_only() -> None:
     found = inverted("bar[n=20,sensors=20,noise=1e-2]", optimizer="trust", limits=Limits(60, 1e-6))
     assert all(step.step_length > 0.0 for step in found.iterates[1:])

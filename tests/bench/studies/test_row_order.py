@@ -9,7 +9,7 @@ import pytest
 from comparisons import row, stored
 
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.studies.bill.command import Done
+from gradient_routes.bench.studies.bill.done import Done
 
 ROUTES = ("adjoint", "tangent", "fd-central", "complex-step")
 

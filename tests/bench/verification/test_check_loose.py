@@ -31,7 +31,7 @@ ROOTS = np.array([2.0, 3.0])
 def test_a_plateau_that_falls_with_the_tolerance_is_the_solvers(tolerance: float) -> None:
     found = check(*loosely(tolerance), ROOTS, tighten=lambda factor: loosely(tolerance * factor))
     assert (found.verdict, found.exit_code) == ("solver-limited", 3)
-    assert "the gradient is sound, J is loosely solved" in found.says
+    assert "the gradient is right, J is solved loosely" in found.says
     assert found.tightened_plateau < 0.1 * found.plateau
 
 
@@ -100,7 +100,7 @@ def test_a_budget_too_small_to_tighten_convicts_nobody() -> None:
     [
         (lambda factor: 1 / 0, "ZeroDivisionError"),
         (lambda factor: None, "has no objective(p)"),
-        (lambda factor: (boom, lambda p: p), "is not to be had"),
+        (lambda factor: (boom, lambda p: p), "cannot be evaluated"),
         (lambda factor: (lambda p: 1.0, boom), "the gradient raises"),
     ],
 )
@@ -108,7 +108,7 @@ def test_a_tighten_that_fails_is_said(tighten, says: str) -> None:
     found = check(*loosely(1e-4), ROOTS, tighten=tighten)
     assert found.verdict == "undetermined"
     assert says in found.not_done[0]
-    assert found.todo.startswith("mend this")
+    assert found.todo.startswith("fix this first")
 
 
 def test_what_is_tightened_keeps_its_bounds() -> None:

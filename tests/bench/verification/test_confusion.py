@@ -22,7 +22,7 @@ DUFFING = f"{ROOT / 'examples' / 'plugin' / 'duffing' / 'problem.py'}:Duffing"
 CULPRITS = {
     "sign": "the sign of lam",
     "factor": "off by the factor 2",
-    "transpose": "R_u was solved with where R_u^T should be",
+    "transpose": "the solve used R_u instead of R_u^T",
     "missing-term": "J_p was dropped",
     "functional": "the functional",
     "scale": "the chain rule",

@@ -1,20 +1,20 @@
-"""Options of a block: which there can be, and which go together."""
+"""Validation of the options of the block."""
 
 from __future__ import annotations
 
 import math
 from types import SimpleNamespace
 
-from gradient_routes.problems.data.regularization import WIDTH
+from gradient_routes.problems.data.regularization import PHI_WIDTH
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.mechanics.design_variables import FIELDS, MATERIAL
 
-CASES = 3  # along z, x, y
-MOST = 10**7  # cells, markers, layers: more fit in no memory
+MAX_CASES = 3  # along z, x, y
+MAX_COUNT = 10**7  # of cells, markers, layers
 
 
 def check(o: SimpleNamespace) -> None:
-    """Raises InputError for options by their names that are out of range, or that would be ignored."""
+    """Raises InputError for options (attributes of o) that are out of range or would be ignored."""
     _check_counts(o)
     _check_applies(o)
     _check_numbers(o)
@@ -40,11 +40,11 @@ def _check_counts(o: SimpleNamespace) -> None:
         count = getattr(o, name)
         if count is not None and count < value:
             raise InputError(f"block: {name}={count} - choose {name} >= {value}")
-    if o.cases > CASES:
-        raise InputError(f"block: cases={o.cases} - there are 1 to {CASES}: along z, x, y")
-    greatest = max((o.nx or o.n) * (o.ny or o.n) * (o.nz or o.n), o.markers, o.layers)
-    if greatest > MOST:
-        raise InputError(f"block: {greatest:g} cells, markers or layers - at most {MOST:g}")
+    if o.cases > MAX_CASES:
+        raise InputError(f"block: cases={o.cases} - there are 1 to {MAX_CASES}: along z, x, y")
+    greatest = max((o.nx or o.n) * (o.ny or o.n) * (o.nz or o.n), o.markers, o.layers or 0)
+    if greatest > MAX_COUNT:
+        raise InputError(f"block: {greatest:g} cells, markers or layers - at most {MAX_COUNT:g}")
 
 
 def _check_applies(o: SimpleNamespace) -> None:
@@ -56,11 +56,11 @@ def _check_applies(o: SimpleNamespace) -> None:
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
-        ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers != 4}),
+        ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers}),
         ("unknown=shape", o.unknown == "shape", True, {"surface": o.surface != "right"}),
         ("load=displacement", gripped, True, {"displacement": o.displacement != 0.2}),
         ("load=displacement", gripped, False, {"traction": o.traction != 0.2}),
-        ("phi=tv", o.phi == "tv", True, {"phi_width": o.phi_width != WIDTH}),
+        ("phi=tv", o.phi == "tv", True, {"phi_width": o.phi_width != PHI_WIDTH}),
         ("unknown=modulus or layers", o.unknown in FIELDS, True, {"phi": o.phi in ("tikhonov", "tv")}),
         ("unknown=modulus or layers", o.unknown in FIELDS, True, {"parametrization": o.parametrization}),
     )

@@ -1,7 +1,7 @@
-"""Kernels and routes that pytest-benchmark timed, against a committed baseline of another time or machine.
+"""Timings of pytest-benchmark against a committed baseline, which another machine may have measured.
 
-What is compared is the fastest call over the calibration of the same minutes (tests/benchmarks/calibration.py): a
-machine half as fast halves both. Work counts are exact.
+Compared is the fastest call divided by the calibration of the same minutes (calibration.py), which a slower machine
+slows as much. Work counts are exact.
 """
 
 from __future__ import annotations

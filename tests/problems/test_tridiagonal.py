@@ -1,4 +1,4 @@
-"""K = B^T D B: the sums are accurate, the zeros exact, the factorization inverts."""
+"""Tridiagonal matrices K = B^T D B: accurate sums, exact zeros, factorizations."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.tridiagonal import (
     BLOCKED_FROM,
-    Bordered,
-    Chain,
+    BorderedTridiagonal,
     ElementForces,
+    Tridiagonal,
     cumulative_sum,
     difference,
     divergence,
@@ -55,7 +55,7 @@ def test_zeros_behind_the_last_entry_stay_exact(n: int, seed: int, imaginary: bo
     m = int(rng.integers(1, n + 1))
     b = np.zeros(n, complex if imaginary else float)
     b[:m] = rng.standard_normal(m) * (1j if imaginary else 1.0)
-    u = factorize(Chain(rng.uniform(0.1, 10.0, n)), "test").solve(b)
+    u = factorize(Tridiagonal(rng.uniform(0.1, 10.0, n)), "test").solve(b)
     assert not difference(u)[m:].any()
 
 
@@ -67,17 +67,22 @@ def test_operators_equal_their_dense_matrices(n: int) -> None:
     K = B.T @ np.diag(D) @ B
     np.testing.assert_allclose(difference(v), B @ v, rtol=1e-15, atol=1e-15)
     np.testing.assert_allclose(divergence(v), B.T @ v, rtol=1e-15, atol=1e-15)
-    np.testing.assert_allclose(Chain(D) @ v, K @ v, rtol=1e-14, atol=1e-14)
-    np.testing.assert_allclose(Chain(D).T @ v, K.T @ v, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(Tridiagonal(D) @ v, K @ v, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(Tridiagonal(D).T @ v, K.T @ v, rtol=1e-14, atol=1e-14)
     np.testing.assert_allclose(ElementForces(s) @ v, B.T @ np.diag(s) @ v, rtol=1e-14, atol=1e-14)
     np.testing.assert_allclose(ElementForces(s).T @ v, np.diag(s) @ B @ v, rtol=1e-14, atol=1e-14)
-    assert np.abs(K).sum(axis=1).max() <= Chain(D).norm <= 4 * np.abs(K).sum(axis=1).max()
+    assert np.abs(K).sum(axis=1).max() <= Tridiagonal(D).norm <= 4 * np.abs(K).sum(axis=1).max()
     e, w = np.eye(n)[-1], rng.uniform(1, 2, n + 1)
     stopped, c = K + 3.0 * np.outer(e, e), 0.5
-    np.testing.assert_allclose(Chain(D, 3.0) @ v, stopped @ v, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(Tridiagonal(D, 3.0) @ v, stopped @ v, rtol=1e-14, atol=1e-14)
     active = np.block([[K + c * np.outer(e, e), e[:, None]], [e[None], np.zeros((1, 1))]])
     inactive = np.block([[K, np.zeros((n, 1))], [np.zeros((1, n)), np.full((1, 1), -1 / c)]])
-    for dense, A in ((stopped, Chain(D, 3.0)), (active, Bordered(D, c, True)), (inactive, Bordered(D, c, False))):
+    matrices = (
+        (stopped, Tridiagonal(D, 3.0)),
+        (active, BorderedTridiagonal(D, c, True)),
+        (inactive, BorderedTridiagonal(D, c, False)),
+    )
+    for dense, A in matrices:
         np.testing.assert_allclose(A @ w[: len(dense)], dense @ w[: len(dense)], rtol=1e-14, atol=1e-14)
         assert np.abs(dense).sum(axis=1).max() <= A.norm <= 4 * np.abs(dense).sum(axis=1).max()
     forces = np.vstack([B.T @ np.diag(s), np.zeros(n)])
@@ -93,11 +98,11 @@ def test_stopped_chains_are_inverted_however_stiff_the_stop(n: int, k: float, im
     rng = np.random.default_rng(0)
     D, b = rng.uniform(1, 2, n), rng.standard_normal(n + 1)
     D, b = (D + 0.1j * rng.standard_normal(n), b + 1j * rng.standard_normal(n + 1)) if imaginary else (D, b)
-    for A in (Chain(D, k), Bordered(D, k, True), Bordered(D, k, False)):
-        f = b[: n + (not isinstance(A, Chain))]
+    for A in (Tridiagonal(D, k), BorderedTridiagonal(D, k, True), BorderedTridiagonal(D, k, False)):
+        f = b[: n + (not isinstance(A, Tridiagonal))]
         x = factorize(A, "test").solve(f)
         rounding = 1e-15 * max(np.abs(x).max() * 4 * np.sqrt(n), 1.0)
-        if isinstance(A, Bordered) and A.active:
+        if isinstance(A, BorderedTridiagonal) and A.active:
             rounding *= 1 + k  # a prescribed u_N loads its spring c with c u_N, and so lam
         assert np.abs(A @ x - f).max() < 10 * rounding
 
@@ -111,10 +116,10 @@ def test_factorizations_invert_the_matrix_and_its_transpose(kind: str) -> None:
     b, D = rng.standard_normal(n), rng.uniform(1, 2, n)
     A = rng.standard_normal((n, n)) + 4 * np.eye(n)  # not symmetric: a wrong transpose shows
     A = {
-        "chain": Chain(D),
-        "stopped": Chain(D, 3.0),
-        "active": Bordered(D[1:], 3.0, True),
-        "inactive": Bordered(D[1:], 3.0, False),
+        "chain": Tridiagonal(D),
+        "stopped": Tridiagonal(D, 3.0),
+        "active": BorderedTridiagonal(D[1:], 3.0, True),
+        "inactive": BorderedTridiagonal(D[1:], 3.0, False),
         "dense": A,
         "sparse": csr_array(A),
     }[kind]
@@ -127,7 +132,7 @@ def test_singular_matrices_are_refused_with_a_sentence() -> None:
     from scipy.sparse import csr_array
 
     with pytest.raises(SingularMatrix, match="element 2"):
-        factorize(Chain(np.array([1.0, 0.0])), "test")
+        factorize(Tridiagonal(np.array([1.0, 0.0])), "test")
     for A in (np.zeros((2, 2)), csr_array((2, 2)), csr_array(np.diag([1.0, 0.0]))):
         with pytest.raises(SingularMatrix, match="check p and the supports"):
             factorize(A, "test")

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from commands import ROOT, shell
 
-from gradient_routes.bench.regression.regression import FACTOR, Kernel, again, judge, of_session, read, typical, write
 from gradient_routes.problems.errors import InputError
+from tests.benchmarks.kernels import FACTOR, Kernel, again, judge, of_session, read, typical, write
 
 WORK = {"forward_solves": 1, "transposed_solves": 1}
 BASELINE = ROOT / "tests" / "benchmarks" / "baseline.json"

@@ -1,4 +1,4 @@
-"""The bar that meets a stop: laws of contact, branches, what the blind tail sees, and solves that find no branch."""
+"""The bar with a stop: contact laws, active sets, the gradient behind the last sensor, solves that fail."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from test_routes import differentiate, ids, reference
 
 from gradient_routes.bench.execution.references import error
 from gradient_routes.problems.bar import Bar, true_modulus
-from gradient_routes.problems.contact import Compliant, Law, Penalty, Quadratic, Softplus
+from gradient_routes.problems.contact import CompliantStop, ContactLaw, Penalty, Quadratic, Softplus
 from gradient_routes.problems.errors import InputError, NotConverged
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.routes.adjoint import adjoint
@@ -31,7 +31,7 @@ by_stop = pytest.mark.parametrize("stop", STOPS)
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
 @pytest.mark.parametrize("g", [-3.0, -0.03, -0.01, 0.01, 0.03, 3.0])
-def test_forces_have_their_stiffness_and_differ_by_the_rounded_kink(law: Law, g: float) -> None:
+def test_forces_have_their_stiffness_and_differ_by_the_rounded_kink(law: ContactLaw, g: float) -> None:
     k = float(law.stiffness(np.float64(g)))
     assert k == pytest.approx(complex_derivative(law.force, np.array(g), 1.0), rel=1e-13)
     q, dq = jax.jvp(lambda g: law.force(g, jnp), (g,), (1.0,))
@@ -49,7 +49,7 @@ def test_softplus_overflows_nowhere(g: float) -> None:
 
 @by_stop
 @pytest.mark.parametrize("penetration", [-0.3, -0.004, 0.004, 0.3])
-def test_partial_derivatives_hold_on_every_branch(stop: str, penetration: float) -> None:
+def test_partial_derivatives_hold_for_every_active_set(stop: str, penetration: float) -> None:
     bar = Bar(n=4, stop=stop)
     p, rng = somewhere(bar), np.random.default_rng(2)
     u = rng.standard_normal(bar.n_state)
@@ -62,8 +62,8 @@ def test_partial_derivatives_hold_on_every_branch(stop: str, penetration: float)
     traced = bar.traced()
     by_jax = jax.jvp(lambda u: traced.residual(u, p), (u,), (du,))[1]
     np.testing.assert_allclose(by_jax, by_complex_step, rtol=1e-12, atol=1e-13)
-    branch = "closed" if penetration > 0 else "open"
-    assert bar.active_set(u, p) == (None if stop in ("softplus", "quadratic") else branch)
+    active_set = "closed" if penetration > 0 else "open"
+    assert bar.active_set(u, p) == (None if stop in ("softplus", "quadratic") else active_set)
 
 
 def test_exact_contact_holds_signorini_s_conditions() -> None:
@@ -87,18 +87,18 @@ def test_stiffer_stops_come_nearer_to_exact_contact(stop: str) -> None:
     assert all(0.005 < after / before < 0.02 for before, after in pairwise(errors))  # O(1 / k_c)
 
 
-BRANCHES = {"closed": 0.8, "open": 1.5}
+GAPS = {"closed": 0.8, "open": 1.5}
 
 
-@pytest.mark.parametrize("branch", BRANCHES)
+@pytest.mark.parametrize("active_set", GAPS)
 @pytest.mark.parametrize("route", [tangent, adjoint, implicit_ad, complex_step], ids=ids)
-def test_exact_routes_agree_on_each_branch_at_the_declared_price(route: Route, branch: str) -> None:
-    bar = Bar(n=8, stop="multiplier", gap=BRANCHES[branch])
+def test_exact_routes_agree_on_each_active_set_at_the_declared_price(route: Route, active_set: str) -> None:
+    bar = Bar(n=8, stop="multiplier", gap=GAPS[active_set])
     p = somewhere(bar)
     result, counted, declared = differentiate(route, bar, p, Solver())
     assert error(result.gradient, reference(bar, p))[0] < 1e-12
     assert counted == declared
-    each = 2 if branch == "closed" else 1  # active-set steps: one finds the set, one the state
+    each = 2 if active_set == "closed" else 1  # active-set steps: one finds the set, one the state
     solves, polish = (8, 8) if route is complex_step else (1, 0)
     assert counted.newton_iterations == solves * each + polish
     assert counted.residuals == counted.newton_iterations + solves, "no step is halved"
@@ -109,14 +109,14 @@ def test_exact_routes_agree_on_each_branch_at_the_declared_price(route: Route, b
 @pytest.mark.parametrize("route", [tangent, adjoint, implicit_ad], ids=ids)
 def test_the_tail_is_blind_until_the_tip_meets_the_stop(route: Route, n: int, stop: str) -> None:
     n = min(n, 300) if route is tangent else n
-    for gap, touched in ((2.0, False), (0.5, True)):
+    for gap, in_contact in ((2.0, False), (0.5, True)):
         bar = Bar(n=n, sensors=[2, 5], stop=stop, gap=gap)
         p = somewhere(bar)
         result, _, _ = differentiate(route, bar, p)
         assert result.gradient[:5].all()
-        assert result.gradient[5:].all() if touched else not result.gradient[5:].any()
-        assert bar.view(p, result.u, result.lam).blind.tolist() == [False] * 5 + [not touched] * (n - 5)
-        assert bar.reference(p).gradient[5:].any() == touched
+        assert result.gradient[5:].all() if in_contact else not result.gradient[5:].any()
+        assert bar.view(p, result.u, result.lam).blind.tolist() == [False] * 5 + [not in_contact] * (n - 5)
+        assert bar.reference(p).gradient[5:].any() == in_contact
 
 
 def test_notes_say_what_is_blind_and_when() -> None:
@@ -203,7 +203,7 @@ def test_the_closed_form_holds_where_the_stop_carries_nearly_all_or_nothing(stop
 
 @by_stop
 @pytest.mark.parametrize("log_E", [-165.0, -120.0, -80.0, -20.0, 20.0, 80.0, 165.0])
-def test_absurd_bars_are_right_or_refused(stop: str, log_E: float) -> None:
+def test_extreme_moduli_give_the_gradient_or_fail(stop: str, log_E: float) -> None:
     """A soft bar's first iterate is 1e70 m away: all is rounding there, and R does not feel what then cancels."""
     rng, refused = np.random.default_rng(4), 0
     for _ in range(5):
@@ -219,10 +219,10 @@ def test_absurd_bars_are_right_or_refused(stop: str, log_E: float) -> None:
 
 @pytest.mark.parametrize("law", [Softplus(1e3, 1e-9), Softplus(1e-3, 1e-2), Softplus(1e12, 1.0), Quadratic(1e3, 1e-9)])
 @pytest.mark.parametrize("C", np.geomspace(1e-43, 1e43, 9))
-def test_the_force_of_a_stop_in_series_with_a_bar_is_in_equilibrium(law: Law, C: float) -> None:
+def test_the_force_of_a_stop_in_series_with_a_bar_is_in_equilibrium(law: ContactLaw, C: float) -> None:
     """g + C q(g) = F C - gap, however soft the bar or narrow the width, and pressed on by a wide softplus unloaded."""
     g_0 = np.longdouble(C) - 0.8
-    g, q, _ = Compliant(0.8, law).in_series(g_0, np.longdouble(C))
+    g, q, _ = CompliantStop(0.8, law).equilibrium(g_0, np.longdouble(C))
     assert float(abs(g + C * q - g_0)) <= 1e-15 * float(abs(g) + C * q + abs(g_0))
     assert float(q) == pytest.approx(float(law.force(g)), rel=1e-12, abs=1e-18 * law.k_c * float(abs(g)))
 
