@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases import options, registry, selector
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters, Problem
@@ -56,9 +58,27 @@ class RouteSpec:
         return route_named, (self.name, self.options)
 
 
+@dataclass(frozen=True)
+class Case:
+    """A problem and a route, run with these settings; `asked` are the columns of its row that are known before."""
+
+    problem: ProblemSpec
+    route: RouteSpec
+    settings: Settings
+    asked: Row
+
+
 def _written(name: str, given: dict[str, Any], target: Any) -> str:
     declared = options.options_of(registry.factory_of(target))
     return selector.written(name, given, {name: option.default for name, option in declared.items()})
+
+
+def selector_of(kind: registry.Kind, name: str, given: dict[str, Any] | None) -> str:
+    """The selector of a stored problem or route without its defaults; with all options where it is no longer there."""
+    try:
+        return _written(name, given or {}, registry.find(kind, name).load())
+    except InputError:
+        return selector.written(name, given or {}, {})
 
 
 def problem_named(name: str, options: dict[str, Any]) -> ProblemSpec:

@@ -19,11 +19,18 @@ from gradient_routes.bench.cases.sources import Stamp, digest, stamp, stamps
 HARNESS = 5  # raised when rows come to mean something else: all that was kept before is then stale
 
 
-def identified(row: Row, problem: case.ProblemSpec, route: case.RouteSpec, settings: Settings, threads: int) -> Row:
-    """The row with its settings, its case_key and its content_key. `row` has its options as given."""
-    asked = settings_of(settings, threads)
-    key = hashed(*(row[name] for name in ("problem", "problem_options", "route", "route_options", "at")), asked)
-    return row | {"settings": asked, "case_key": key, "content_key": content_key(key, problem, route, settings.at)}
+def identity(problem: case.ProblemSpec, route: case.RouteSpec, settings: Settings, threads: int) -> Row:
+    """What is asked of a case, as columns, and its two keys."""
+    asked = {
+        "problem": problem.name,
+        "problem_options": problem.options,
+        "route": route.name,
+        "route_options": route.options,
+        "at": settings.at,
+        "settings": settings_of(settings, threads),
+    }
+    key = hashed(*asked.values())
+    return asked | {"case_key": key, "content_key": content_key(key, problem, route, settings.at)}
 
 
 def settings_of(settings: Settings, threads: int) -> dict[str, Any]:

@@ -1,12 +1,14 @@
-"""What comes of a case: a row, its raw timings, and what is to be shown or written beside."""
+"""What comes of a case: a row, its raw timings, and what is to be shown or written beside; and how it comes about."""
 
 from __future__ import annotations
 
 import traceback
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
+from gradient_routes.bench.cases.row import row_of
 from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.cases.status import Status, one_line, reason_of, status_of
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
@@ -53,37 +55,53 @@ class Outcome:
     place: int = 0
 
 
-def failed(row: Row, who: str, failure: BaseException) -> Row:
-    """The row of a case that raised `failure`: its status, the reason in a sentence, the traceback."""
-    return row | {
-        "status": status_of(failure),
-        "reason": reason_of(failure, who),
-        "traceback": "".join(traceback.format_exception(failure)),
-    }
+class Record:
+    """What is asked of a case, and what is known of it so far; at the end it makes the outcome, and the row."""
+
+    def __init__(self, asked: Row) -> None:
+        self.asked = asked
+        self.known: Row = {}
+        self._new: Row = {}
+
+    def add(self, values: Row) -> None:
+        """Columns that are known now."""
+        self.known |= values
+        self._new |= values
+
+    def note(self, what: str) -> None:
+        """Something to be read beside the numbers."""
+        self.add({"note": noted(self.known.get("note"), what)})
+
+    def news(self) -> Row:
+        """What has become known since this was asked last."""
+        news, self._new = self._new, {}
+        return news
+
+    def ended(self, status: Status, reason: str | None = None, **beside: Any) -> Outcome:
+        """The outcome; `beside` are its fields but for the row."""
+        return Outcome(row_of(self.asked | self.known | {"status": status, "reason": reason}), **beside)
+
+    def failed(self, failure: BaseException, who: str, **beside: Any) -> Outcome:
+        """The outcome of a case that raised `failure`: the reason in a sentence, the traceback."""
+        self.add({"traceback": "".join(traceback.format_exception(failure))})
+        return self.ended(status_of(failure), reason_of(failure, who), **beside)
+
+    def unbuilt(self, failure: BaseException) -> Outcome:
+        """The outcome of a case whose problem cannot be built."""
+        outcome = self.failed(failure, self.asked["problem"])
+        if isinstance(failure, RoutesError):
+            return outcome
+        said = f"problem '{self.asked['problem']}' cannot be built: {one_line(failure)} - see --debug"
+        return replace(outcome, row=outcome.row | {"reason": said})
+
+    def refused(self, refusal: RoutesError) -> Outcome:
+        """The outcome of a case whose problem does not take what it was given."""
+        return self.ended(Status.FAILED, str(refusal), refusal=refusal)
 
 
-def unbuilt(row: Row, problem: str, failure: BaseException) -> Outcome:
-    """The outcome of a case whose problem cannot be built."""
-    row = failed(row, problem, failure)
-    if not isinstance(failure, RoutesError):
-        row["reason"] = f"problem '{problem}' cannot be built: {one_line(failure)} - see --debug"
-    return Outcome(row)
-
-
-def outdated(row: Row, file: str) -> Row:
-    """The row of a case whose code or data have changed while it ran."""
-    reason = f"{row['route']}: {file} has changed since the run began - run it again"
-    return row | {"status": Status.FAILED, "reason": reason}
-
-
-def refused(row: Row, refusal: RoutesError) -> Outcome:
-    """The outcome of a case whose problem does not take what it was given."""
-    return Outcome(row | {"status": Status.FAILED, "reason": str(refusal)}, refusal=refusal)
-
-
-def note(row: Row, what: str) -> None:
-    """Something to be read beside the numbers."""
-    row["note"] = f"{row['note']}; {what}" if row["note"] else what
+def noted(before: str | None, what: str) -> str:
+    """A note with another one behind it."""
+    return f"{before}; {what}" if before else what
 
 
 def bare(error: InputError | DomainError) -> InputError | DomainError:

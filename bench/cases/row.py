@@ -111,6 +111,15 @@ def empty_row() -> Row:
     return dict.fromkeys((c.name for c in COLUMNS), None)
 
 
+def row_of(known: Row) -> Row:
+    """The row of what is known; the rest is absent. Raises KeyError for what is no column."""
+    row = empty_row()
+    unknown = known.keys() - row.keys()
+    if unknown:
+        raise KeyError(f"no column {sorted(unknown)[0]} - declare it in bench/cases/row.py")
+    return row | known
+
+
 def clean(value: Any) -> Any:
     """JSON and SQL have no NaN: what is not a finite number is absent, inside objects, too."""
     if isinstance(value, dict):

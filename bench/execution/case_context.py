@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,28 @@ from gradient_routes.problems.problem import Array, Fields, Offers, ParameterVie
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, State
 from gradient_routes.routes.route import Options, Result, Route
+from gradient_routes.routes.tally import Work
 
 
-class Workbench:
+@dataclass(frozen=True)
+class Prediction:
+    """What a route will cost: wall time, bytes of tape, work; and why it exceeds the budget, None where it does not."""
+
+    seconds: float
+    tape: float | None
+    work: Work
+    objection: str | None
+
+    @property
+    def columns(self) -> Row:
+        return {
+            "predicted_s": self.seconds,
+            "predicted_tape_bytes": self.tape,
+            "predicted_work": asdict(self.work),
+        }
+
+
+class CaseContext:
     """A problem at one p, with what all its routes share: prices and references.
 
     `found` are references known from before. Raises InputError and DomainError, and what the problem raises.
@@ -44,7 +63,7 @@ class Workbench:
         self.p.flags.writeable = False  # shared by all routes
         # references are independent of the solver that is examined
         direct = replace(settings.solver, linear_solver=Solver.linear_solver, newton=Solver.newton)
-        self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_judge, found)
+        self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_reference, found)
         self._forward_model = self.model()
         self._priced: tuple[Prices, State | None] | Exception | None = None
 
@@ -59,19 +78,14 @@ class Workbench:
     def model(self) -> Model:
         return Model(self.problem, self.settings.solver)
 
-    def predict(self, n_p: int, route: Route, options: Options, row: Row) -> str | None:
-        """Fill in the predicted bill; why it is not paid, or None."""
+    def predict(self, n_p: int, route: Route, options: Options) -> Prediction:
         work = route.cost(n_p, self.prices.declared, **options)
         tape = None if route.tape is None else route.tape(self.problem, **options)
-        row |= {
-            "predicted_s": self.prices.seconds(work),
-            "predicted_tape_bytes": tape,
-            "predicted_work": asdict(work),
-        }
-        return unaffordable(row["predicted_s"], tape, work, self.settings.budget)
+        seconds = self.prices.seconds(work)
+        return Prediction(seconds, tape, work, unaffordable(seconds, tape, work, self.settings.budget))
 
-    def _unaffordable_judge(self, route: Route, n_p: int) -> str | None:
-        return self.predict(n_p, route, route.defaults, {})
+    def _unaffordable_reference(self, route: Route, n_p: int) -> str | None:
+        return self.predict(n_p, route, route.defaults).objection
 
     def price(self) -> tuple[Prices, State | None]:
         """Prices and the state they were measured on; a forward solve that fails is not tried again."""

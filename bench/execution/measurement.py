@@ -1,112 +1,173 @@
-"""A route on a workbench, measured phase by phase: prepared, called, judged, weighed, and timed in turns."""
+"""A route on a problem, measured phase by phase: prepared, called, judged, its work counted, and timed in turns."""
 
 from __future__ import annotations
 
-import socket
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from statistics import median
 from typing import Any
 
 import numpy as np
 
-from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.case import Case
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import environment
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
-from gradient_routes.bench.cases.outcome import Outcome, failed, note
-from gradient_routes.bench.cases.row import empty_row
-from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite
-from gradient_routes.bench.execution.case_context import Workbench
+from gradient_routes.bench.cases.outcome import Outcome, Record
+from gradient_routes.bench.cases.samples import Samples
+from gradient_routes.bench.cases.sources import Stamp, changed
+from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite, Status
+from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.execution.isolation.channel import Channel
-from gradient_routes.bench.execution.isolation.messages import Ready, Turn, Turned
+from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
-from gradient_routes.bench.execution.references import Judge, norm2
+from gradient_routes.bench.execution.references import Found, Judge, norm2
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
-from gradient_routes.bench.units import duration, now
+from gradient_routes.bench.units import duration
+from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
-SMALL = 1e-6  # relative residual of a state that deserves to be called converged
+SMALL = 1e-6  # relative residual of a state that counts as converged
 WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
-
 FLOAT64 = "compute in float64 (JAX: jax.config.update('jax_enable_x64', True), PyTorch: dtype=torch.float64)"
 
-Report = Callable[[str, Row], None]  # the phase that begins, and what is known of the row
+
+@dataclass(frozen=True)
+class Measure:
+    """The job of a case. Says Begun; Known when a phase begins; Ready before it is timed, in turns as told; and Done.
+
+    witnesses  files that the case rests on: where one has changed since, the row must not stand under its key
+    checked_s  what the process has spent on other things than the case
+    """
+
+    case: Case
+    found: Found
+    witnesses: tuple[Stamp, ...] = ()
+    checked_s: float = 0.0
+
+    @property
+    def name(self) -> str:
+        return self.case.route.name
+
+    @property
+    def asked(self) -> Row:
+        return self.case.asked
+
+    def __call__(self, channel: Channel) -> None:
+        """Raises InputError and DomainError for a problem that does not take what it was given."""
+        record = Record(self.asked)
+
+        def begin(phase: str) -> None:
+            channel.say(Known(phase, record.news()))
+
+        channel.say(Begun(environment()))
+        record.add({"prepare_s": age() - self.checked_s})
+        begin("the building of its problem")
+        try:
+            context = CaseContext(self.case.problem, self.case.settings, self.found)
+        except (InputError, DomainError):
+            raise
+        except FOREIGN as failure:
+            channel.say(Done(record.unbuilt(failure), {}))
+            return
+        measured = measure(context, self.case, record, begin)
+        outcome = measured if isinstance(measured, Outcome) else in_turns(measured, channel)
+        file = changed(self.witnesses)
+        if file is None:
+            channel.say(Done(outcome, context.judges.found))
+        else:
+            reason = f"{self.name}: {file} has changed since the run began - run it again"
+            channel.say(Done(record.ended(Status.FAILED, reason), {}))
 
 
-def quiet(phase: str, row: Row) -> None:
-    """Nobody listens."""
+def age() -> float:
+    """Seconds since this process was started."""
+    import psutil
+
+    return float(time.time() - psutil.Process().create_time())
 
 
-def begun_row(spec: ProblemSpec, route: RouteSpec, settings: Settings) -> Row:
-    """A row that says what is run, when and where."""
-    return empty_row() | {
-        "problem": spec.name,
-        "problem_options": spec.options,
-        "route": route.name,
-        "route_options": route.options,
-        "at": settings.at,
-        "started": now(),
-        "host": socket.gethostname(),
-    }
+def in_turns(measured: Measurement, channel: Channel) -> Outcome:
+    """Timed when told to."""
+    channel.say(Ready(measured.long, measured.context.judges.found))
+    order = channel.hear()
+    while isinstance(order, Turn):
+        channel.say(Turned(measured.turn()))
+        order = channel.hear()
+    return measured.outcome(order.interleaved)
 
 
-def measure(bench: Workbench, spec: RouteSpec, row: Row, report: Report = quiet) -> Measurement | Outcome:
-    """One route up to its timing, which comes in turns; an Outcome where there is nothing to time."""
-    row |= {"n_param": bench.n_p, "partial": bench.partial}
+def measure(
+    context: CaseContext, case: Case, record: Record, begin: Callable[[str], None] = lambda phase: None
+) -> Measurement | Outcome:
+    """A case up to its timing, which comes in turns; an Outcome where there is nothing to time.
+
+    `begin` is told of every phase that begins.
+    """
+    record.add({"n_param": context.n_p, "partial": context.partial})
     try:
-        row |= {"n_state": bench.problem.n_state, "note": "; ".join(bench.problem.notes) or None}
+        record.add({"n_state": context.problem.n_state, "note": "; ".join(context.problem.notes) or None})
         with undisturbed():
-            return Measurement.begun(bench, spec, row, report)
+            return _measured(context, case, record, begin)
     except FOREIGN as failure:
-        return Outcome(failed(row, spec.route.name, failure), environment=environment())
+        return record.failed(failure, case.route.name, environment=environment())
 
 
+def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[[str], None]) -> Measurement | Outcome:
+    route, p, model = case.route.route, context.p, context.model()
+
+    def skipped(reason: str) -> Outcome:
+        return record.ended(Status.SKIPPED, reason, environment=environment())
+
+    def affordable(options: Options) -> bool:
+        return context.predict(len(p), route, options).objection is None
+
+    objection = route.objection(context.problem, **case.route.options)
+    if objection is not None:
+        return skipped(objection)
+    begin("its first forward solve")
+    options = route.expect(model, p, **case.route.options)
+    predicted = context.predict(len(p), route, options)
+    record.add(predicted.columns)
+    if predicted.objection is None:
+        begin("the choice of its options")
+        resolve_s, options = seconds_of(lambda: route.resolve(model, p, affordable, **case.route.options))
+        predicted = context.predict(len(p), route, options)
+        record.add({"route_options": options, **predicted.columns})
+    _note_whole(context, route, options, record)
+    if predicted.objection is not None:
+        return skipped(predicted.objection)
+    begin("preparation")
+    prepare_s, gradient = seconds_of(lambda: route.prepare(model, p, **options))
+    record.add({"prepare_s": (record.known.get("prepare_s") or 0.0) + context.build_s + resolve_s + prepare_s})
+    begin("its first call")
+    first_s, result = seconds_of(lambda: gradient(p))
+    record.add({"first_s": first_s})
+    record.add(_checked(context, route, result, record))
+    begin("judgement")
+    _judge(context, route, record, np.asarray(result.gradient))
+    begin("the counting of its work")
+    _count(context, route, options, lambda: gradient(p), model, record)
+    rounds = Rounds(lambda: gradient(p), context.forward(), first_s, context.settings.min_time)
+    begin("timing")
+    return Measurement(context, route, record, result, rounds if context.settings.timed else None)
+
+
+@dataclass(frozen=True)
 class Measurement:
-    """A route on a Workbench, prepared, called, judged and weighed; its timing comes in turns."""
+    """A case that has been prepared, called and judged; its timing comes in turns, where it is timed."""
 
-    def __init__(self, bench: Workbench, row: Row, result: Result, rounds: Rounds | None, route: Route) -> None:
-        self.bench, self.row, self.result, self.rounds, self.route = bench, row, result, rounds, route
-
-    @classmethod
-    def begun(cls, bench: Workbench, spec: RouteSpec, row: Row, report: Report) -> Measurement | Outcome:
-        """All but the timing, or the outcome of what does not run or is not paid for."""
-        route, p, model = spec.route, bench.p, bench.model()
-        objection = route.objection(bench.problem, **spec.options)
-        if objection is not None:
-            return _skipped(row, objection)
-        report("its first forward solve", row)
-        options = route.expect(model, p, **spec.options)
-        reason = bench.predict(len(p), route, options, row)
-        if reason is None:
-            report("the choice of its options", row)
-            resolve_s, options = seconds_of(
-                lambda: route.resolve(model, p, lambda o: bench.predict(len(p), route, o, {}) is None, **spec.options)
-            )
-            reason = bench.predict(len(p), route, options, row)
-            row["route_options"] = options
-        _note_whole(bench, route, options, row)
-        if reason is not None:
-            return _skipped(row, reason)
-        report("preparation", row)
-        prepare_s, gradient = seconds_of(lambda: route.prepare(model, p, **options))
-        row["prepare_s"] = (row["prepare_s"] or 0.0) + bench.build_s + resolve_s + prepare_s
-        report("its first call", row)
-        row["first_s"], result = seconds_of(lambda: gradient(p))
-        _check(bench, route, result, row)
-        report("judgement", row)
-        _judge(bench, route, row, np.asarray(result.gradient))
-        report("the counting of its work", row)
-        _weigh(bench, route, options, lambda: gradient(p), model, row)
-        rounds = Rounds(lambda: gradient(p), bench.forward(), row["first_s"], bench.settings.min_time)
-        report("timing", row)
-        return cls(bench, row, result, rounds if bench.settings.timed else None, route)
+    context: CaseContext
+    route: Route
+    record: Record
+    result: Result
+    rounds: Rounds | None
 
     @property
     def long(self) -> bool:
@@ -118,37 +179,37 @@ class Measurement:
         with undisturbed():
             return self.rounds is not None and self.rounds.turn()
 
-    def in_turns(self, channel: Channel) -> Outcome:
-        """Timed when told to."""
-        channel.say(Ready(self.long, self.bench.judges.found))
-        order = channel.hear()
-        while isinstance(order, Turn):
-            channel.say(Turned(self.turn()))
-            order = channel.hear()
-        return self.outcome(order.interleaved)
-
     def outcome(self, interleaved: int) -> Outcome:
-        """The row with its timings, taken beside those of so many cases."""
-        samples = None
-        if self.rounds is not None:
-            samples = self.rounds.samples
-            lower, upper = samples.quartiles
-            self.row |= {
-                "seconds": median(samples.gradient),
-                "seconds_min": min(samples.gradient),
-                "seconds_q1": lower,
-                "seconds_q3": upper,
-                "unstable": None if samples.unstable is None else int(samples.unstable),
-                "n_samples": len(samples.gradient),
-                "calls_per_sample": samples.calls,
-                "interleaved": interleaved,
-                "forward_s": median(samples.forward),
-                "forward_ratio": samples.ratio,
-            }
+        """The outcome with its timings, taken beside those of so many cases."""
+        samples = None if self.rounds is None else self.rounds.samples
+        if samples is not None:
+            self.record.add(timings(samples) | {"interleaved": interleaved})
+        context = self.context
         with undisturbed():
-            view, fields = self.bench.view(self.route, self.result), self.bench.fields(self.result)
-            columns = self.bench.sensitivities()
-        return Outcome(self.row | {"status": "ok"}, samples, view, fields, columns, environment())
+            return self.record.ended(
+                Status.OK,
+                samples=samples,
+                view=context.view(self.route, self.result),
+                fields=context.fields(self.result),
+                sensitivities=context.sensitivities(),
+                environment=environment(),
+            )
+
+
+def timings(samples: Samples) -> Row:
+    """The columns of samples."""
+    lower, upper = samples.quartiles
+    return {
+        "seconds": median(samples.gradient),
+        "seconds_min": min(samples.gradient),
+        "seconds_q1": lower,
+        "seconds_q3": upper,
+        "unstable": None if samples.unstable is None else int(samples.unstable),
+        "n_samples": len(samples.gradient),
+        "calls_per_sample": samples.calls,
+        "forward_s": median(samples.forward),
+        "forward_ratio": samples.ratio,
+    }
 
 
 @contextmanager
@@ -158,71 +219,71 @@ def undisturbed() -> Iterator[None]:
         yield
 
 
-def _skipped(row: Row, reason: str) -> Outcome:
-    return Outcome(row | {"status": "skipped", "reason": reason}, environment=environment())
-
-
-def _note_whole(bench: Workbench, route: Route, options: Options, row: Row) -> None:
+def _note_whole(context: CaseContext, route: Route, options: Options, record: Record) -> None:
     """What a partial run would have cost in full."""
-    if bench.partial is not None:
-        work = route.cost(bench.n_p, bench.prices.declared, **options)
-        note(row, f"{route.name}: whole gradient: predicted {duration(bench.prices.seconds(work))} ({summary(work)})")
+    if context.partial is not None:
+        work = route.cost(context.n_p, context.prices.declared, **options)
+        seconds = context.prices.seconds(work)
+        record.note(f"{route.name}: whole gradient: predicted {duration(seconds)} ({summary(work)})")
 
 
-def _check(bench: Workbench, route: Route, result: Result, row: Row) -> None:
-    """Fill in J and the gradient; raise Failure for numbers that are none."""
+def _checked(context: CaseContext, route: Route, result: Result, record: Record) -> Row:
+    """The columns of J and the gradient. Raises Failure for what is no finite real gradient."""
     if np.iscomplexobj(result.gradient):
         raise Failure(f"{route.name}: gradient of complex numbers - return the real dJ/dp")
     given = np.asarray(result.gradient).dtype
     if given.kind == "f" and given.itemsize < 8:
-        note(row, f"{route.name}: gradient in {given}: {FLOAT64}")
+        record.note(f"{route.name}: gradient in {given}: {FLOAT64}")
     g = np.asarray(result.gradient, dtype=np.float64)
-    if g.shape != bench.p.shape:
-        raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(bench.p)} parameters - mend the route")
+    if g.shape != context.p.shape:
+        raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(context.p)} parameters - mend the route")
     bad = np.flatnonzero(~np.isfinite(g))
     if bad.size:
-        first = f"{bench.problem.parameters.label(int(bad[0]))} = {g[bad[0]]}"
+        first = f"{context.problem.parameters.label(int(bad[0]))} = {g[bad[0]]}"
         raise NonFinite(f"{route.name}: {bad.size} of {g.size} gradient components not finite, first {first} - check p")
-    J = bench.objective() if result.J is None else result.J
+    J = context.objective() if result.J is None else result.J
     if not np.isfinite(J):
         raise NonFinite(f"{route.name}: J = {J} - check p and the data")
-    row |= {
+    return {
         "objective": float(J),
-        "gradient": g.tolist() if g.size <= KEEP_GRADIENT or bench.settings.gradient else None,
+        "gradient": g.tolist() if g.size <= KEEP_GRADIENT or context.settings.gradient else None,
         "gradient_norm": norm2(g),
         "residual": None if result.residual is None else float(result.residual),
         "tape_bytes": None if result.tape is None else int(result.tape),
     }
 
 
-def _judge(bench: Workbench, route: Route, row: Row, g: Array) -> None:
-    """Fill in the error of the gradient, and a warning where it is wrong at a converged state."""
-    judge = bench.judges.judge(route)
+def _judge(context: CaseContext, route: Route, record: Record, g: Array) -> None:
+    """The error of the gradient, and a warning where it is wrong at a converged state."""
+    judge = context.judges.judge(route)
     if not isinstance(judge, Judge):
-        note(row, f"{route.name}: error unknown, nobody judges: {judge}")
+        record.note(f"{route.name}: error unknown, no reference: {judge}")
         return
-    row["gradient_error"], row["reference"] = judge.error(g)
-    converged = row["residual"] is not None and row["residual"] <= min(10.0 * bench.settings.solver.rtol, SMALL)
-    if converged and row["gradient_error"] > WRONG:
-        note(row, f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
+    error, reference = judge.error(g)
+    record.add({"gradient_error": error, "reference": reference})
+    residual = record.known["residual"]
+    converged = residual is not None and residual <= min(10.0 * context.settings.solver.rtol, SMALL)
+    if converged and error > WRONG:
+        record.note(f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
 
 
-def _weigh(
-    bench: Workbench, route: Route, options: Options, gradient: Callable[[], Any], model: Model, row: Row
+def _count(
+    context: CaseContext, route: Route, options: Options, gradient: Callable[[], Any], model: Model, record: Record
 ) -> None:
     """Count the work of one call and read its memory, apart from timing."""
     before = model.tally.work
-    row["peak_bytes"], row["memory_method"] = peak_of(gradient)
+    peak, method = peak_of(gradient)
     work = model.tally.work - before
-    declared = route.cost(len(bench.p), replace(bench.prices.declared, counted=work), **options)
-    row |= {"work": asdict(work), "predicted_work": asdict(declared)}
+    declared = route.cost(len(context.p), replace(context.prices.declared, counted=work), **options)
+    record.add({"peak_bytes": peak, "memory_method": method})
+    record.add({"work": asdict(work), "predicted_work": asdict(declared)})
     if work != declared:
-        note(row, f"{route.name}: counted work differs from the declared")
-    if row["tape_bytes"] is not None and options.get("iterations"):
-        iterations = options["iterations"] * (options.get("newton") or 1)
-        row["tape_bytes_per_iteration"] = None if options.get("checkpoint") else row["tape_bytes"] / iterations
-    state = bench.price()[1]
+        record.note(f"{route.name}: counted work differs from the declared")
+    tape = record.known["tape_bytes"]
+    if tape is not None and options.get("iterations") and not options.get("checkpoint"):
+        record.add({"tape_bytes_per_iteration": tape / (options["iterations"] * (options.get("newton") or 1))})
+    state = context.price()[1]
     if state is not None:
-        row |= {"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)}
-        if bench.problem.structure == "spd" and "L D L^T" in state.factors.name:
-            note(row, "R_u is not positive definite at u: factorized as L D L^T (an unstable state, buckled say)")
+        record.add({"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)})
+        if context.problem.structure == "spd" and "L D L^T" in state.factors.name:
+            record.note("R_u is not positive definite at u: factorized as L D L^T (an unstable state, buckled say)")

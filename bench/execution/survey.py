@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import dataclass
+from typing import ClassVar
 
 from gradient_routes.bench.cases.case import ProblemSpec, sized
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.outcome import bare
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.status import FOREIGN
+from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.line import Line
 from gradient_routes.bench.execution.isolation.messages import Returned
-from gradient_routes.bench.execution.measure_job import Survey
 from gradient_routes.bench.execution.pruning import Size
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Builds problems without solving anything. Says of each what `surveyed` returns."""
+
+    problems: list[ProblemSpec]
+    settings: Settings
+    name: ClassVar[str] = "survey"
+
+    def __call__(self, channel: Channel) -> None:
+        for problem in self.problems:
+            channel.say(Returned(surveyed(problem, self.settings.at)))
 
 
 def sizes(problems: list[ProblemSpec], settings: Settings, limits: Limits | None) -> list[Size | None]:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import itertools
 import math
+import socket
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.case import Case, ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.cases.keys import identified, witnesses
-from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.keys import identity, witnesses
+from gradient_routes.bench.cases.outcome import Outcome, Record
 from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.measure_job import Measure
-from gradient_routes.bench.execution.measurement import begun_row
+from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.bench.execution.pruning import Pruning, Size
 from gradient_routes.bench.execution.references import Found
 from gradient_routes.bench.execution.survey import sizes
+from gradient_routes.bench.units import now
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class How:
     cluster: Any = None
 
     @property
-    def row(self) -> Row:
+    def columns(self) -> Row:
         """The columns that tell of it."""
         return {
             "isolated": int(self.isolate),
@@ -75,13 +77,13 @@ class Sweep:
         wanted: Callable[[Row], bool],
     ) -> None:
         self.routes, self.settings, self.how, self.wanted = routes, settings, how, wanted
-        self.problems = [p for p in problems if any(wanted(self._row(p, route)) for route in routes)]
+        self.problems = [p for p in problems if any(wanted(self._asked(p, route)) for route in routes)]
         guarded = how.limits if how.isolate else None
         alone = len(self.problems) == 1
         self.sizes: list[Size | None] = [None] if alone else sizes(self.problems, settings, guarded)
         self.pruning = Pruning()
         self._places = itertools.count()
-        self._started: dict[str, tuple[int, Measure, Size | None]] = {}
+        self._started: dict[str, tuple[int, Case, Size | None]] = {}
 
     def outcomes(self) -> Generator[Outcome]:
         """Raises the refusal of a case that is refused before any other has an outcome."""
@@ -94,8 +96,8 @@ class Sweep:
 
     def _outcomes(self) -> Iterator[Outcome]:
         for outcome in self._side_by_side() if self.how.jobs > 1 or self.how.cluster else self._one_by_one():
-            place, job, size = self._started.pop(outcome.row["case_key"])
-            self.pruning.note(job.problem, job.route, size, outcome.row)
+            place, case, size = self._started.pop(outcome.row["case_key"])
+            self.pruning.note(case.problem, case.route, size, outcome.row)
             yield replace(outcome, place=place)
 
     def _one_by_one(self) -> Iterator[Outcome]:
@@ -134,22 +136,25 @@ class Sweep:
         for problem, size in problems:
             found: Found = {}
             for route in self.routes:
-                known = witnesses(problem, route, self.settings.at)
-                job = Measure(problem, route, self.settings, self._row(problem, route), found, known)
-                if not self.wanted(job.row):
+                case = Case(problem, route, self.settings, self._asked(problem, route))
+                if not self.wanted(case.asked):
                     continue
-                self._started[job.row["case_key"]] = next(self._places), job, size
+                self._started[case.asked["case_key"]] = next(self._places), case, size
                 reason = self.pruning.reason(problem, route, size)
                 if reason is None:
-                    yield job
+                    yield Measure(case, found, witnesses(problem, route, self.settings.at))
                 else:
-                    n_u, n_p = size or (None, None)
-                    row = job.row | {"status": "pruned", "reason": reason, "n_state": n_u, "n_param": n_p}
-                    pruned.append(Outcome(row))
+                    record = Record(case.asked)
+                    record.add(dict(zip(("n_state", "n_param"), size or (), strict=False)))
+                    pruned.append(record.ended(Status.PRUNED, reason))
 
-    def _row(self, problem: ProblemSpec, route: RouteSpec) -> Row:
-        """What is known before it is run."""
+    def _asked(self, problem: ProblemSpec, route: RouteSpec) -> Row:
+        """The columns that are known before it is run."""
         budget = self.settings.budget
-        row = begun_row(problem, route, self.settings) | self.how.row
-        row |= {"budget_s": budget if math.isfinite(budget) else None}
-        return identified(row, problem, route, self.settings, self.how.limits.threads)
+        return {
+            **identity(problem, route, self.settings, self.how.limits.threads),
+            **self.how.columns,
+            "budget_s": budget if math.isfinite(budget) else None,
+            "started": now(),
+            "host": socket.gethostname(),
+        }

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.case import selector_of
 from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.registry import Kind
 from gradient_routes.bench.cases.row import COLUMNS, from_record
-from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.tables import asked
 from gradient_routes.bench.store.schema import tables as schema_tables
 from gradient_routes.bench.store.store import Store
@@ -120,7 +120,7 @@ def selector(kind: Kind, name: str | None, options: Row | None) -> str:
 
 @cache
 def _selector(kind: Kind, name: str, options: str) -> str:
-    return tables.named(kind, {kind: name, f"{kind}_options": json.loads(options)})
+    return selector_of(kind, name, json.loads(options))
 
 
 def schema(table: str) -> dict[str, Column]:

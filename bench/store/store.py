@@ -210,26 +210,25 @@ class Store:
     def _create(self, db: sqlite3.Connection) -> None:
         if db.execute("PRAGMA application_id").fetchone()[0] != 0:
             self._check_kind(db)
-        self._create_tables(db)
         db.execute(f"PRAGMA application_id = {APPLICATION}")
-        db.execute(f"PRAGMA user_version = {SCHEMA}")
+        self._migrate(db)
 
     @staticmethod
-    def _create_tables(db: sqlite3.Connection) -> None:
-        """Those that are not there yet."""
+    def _migrate(db: sqlite3.Connection) -> None:
+        """Tables and columns that the file lacks are added, absent in its rows: of a newer schema, or of a study that
+        has been installed since.
+        """
+        there: dict[str, set[str]] = {}
+        for table, column in db.execute("SELECT m.name, c.name FROM sqlite_master m, pragma_table_info(m.name) c"):
+            there.setdefault(table, set()).add(column)
         for name, columns in tables().items():
-            db.execute(f"CREATE TABLE IF NOT EXISTS {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
+            if name not in there:
+                db.execute(f"CREATE TABLE {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
+            for column in columns if name in there else ():
+                if column.name not in there[name]:
+                    db.execute(f"ALTER TABLE {name} ADD COLUMN {column.name} {column.type}")
         db.execute("CREATE INDEX IF NOT EXISTS by_case ON cases (case_key)")
-
-    def _migrate(self, db: sqlite3.Connection) -> None:
-        """What an older schema lacks is added, absent in its rows."""
-        if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
-            for name, columns in tables().items():
-                there = {column[1] for column in db.execute(f"PRAGMA table_info({name})")}
-                for column in columns:
-                    if there and column.name not in there:
-                        db.execute(f"ALTER TABLE {name} ADD COLUMN {column.name} {column.type}")
-            self._create_tables(db)
+        if db.execute("PRAGMA user_version").fetchone()[0] != SCHEMA:
             db.execute(f"PRAGMA user_version = {SCHEMA}")
 
     def _check_kind(self, db: sqlite3.Connection) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution.case_context import Workbench
+from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.references import Judge
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.routes.newton import Solver
@@ -17,7 +17,7 @@ from gradient_routes.routes.route import Result, Route
 TIGHT = Solver(rtol=1e-13, adjoint_rtol=1e-13)
 
 
-class Bench(Workbench):
+class Bench(CaseContext):
     """A problem at one p, its references and prices those of direct solves. Raises InputError, DomainError."""
 
     def __init__(self, problem: ProblemSpec, at: str, budget: float) -> None:

@@ -33,7 +33,7 @@ class Member:
         return mine == others or self.greeting.hostname == other.greeting.hostname
 
 
-class Crew:
+class DaskWorkers:
     """All workers of a client's cluster that may run cases. wake() is called when there is a reason to look again."""
 
     def __init__(self, client: Client, timed: bool, tell: Tell, wake: Callable[[], None]) -> None:

@@ -13,13 +13,14 @@ from queue import Empty, SimpleQueue
 
 from distributed import CancelledError, Client, Future, KilledWorker
 
-from gradient_routes.bench.cases.outcome import Outcome, failed, note
-from gradient_routes.bench.execution.cluster.dask_workers import Crew, Member, Tell, sent
+from gradient_routes.bench.cases.outcome import Outcome, Record, noted
+from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.execution.cluster.dask_workers import DaskWorkers, Member, Tell, sent
 from gradient_routes.bench.execution.cluster.remote import packed
-from gradient_routes.bench.execution.cluster.shipped_case import sealed
+from gradient_routes.bench.execution.cluster.shipped_case import shipped
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.signals import Interrupt
-from gradient_routes.bench.execution.measure_job import Measure
+from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.problems.errors import RoutesError
 
 TICK = 0.5  # [s] between two looks at who is there
@@ -42,6 +43,13 @@ class Attempt:
     member: Member
     future: Future[bytes | None]
 
+    @property
+    def record(self) -> Record:
+        """What is known here: its host."""
+        record = Record(self.job.asked)
+        record.add({"host": self.member.greeting.hostname})
+        return record
+
 
 class Dispatch:
     """Which worker has which case."""
@@ -49,7 +57,7 @@ class Dispatch:
     def __init__(self, client: Client, limits: Limits, timed: bool, tell: Tell, patience: float) -> None:
         self._client, self._limits, self._patience = client, limits, patience
         self._events: SimpleQueue[Attempt | None] = SimpleQueue()
-        self._crew = Crew(client, timed, tell, lambda: self._events.put(None))
+        self._workers = DaskWorkers(client, timed, tell, lambda: self._events.put(None))
         self._attempts: list[Attempt] = []
         self._waiting: list[tuple[Measure, Lost]] = []
         self._seen = time.monotonic()  # when there was a worker last
@@ -59,7 +67,7 @@ class Dispatch:
         with Interrupt(lambda: self._events.put(None)) as interrupt:
             while self._attempts or self._waiting or self._pull(jobs):
                 self._look()
-                for attempt in [attempt for attempt in self._attempts if attempt.member not in self._crew]:
+                for attempt in [attempt for attempt in self._attempts if attempt.member not in self._workers]:
                     yield from self._lose(attempt)
                 self._send(jobs)
                 yield from self._take(self._event())
@@ -78,17 +86,16 @@ class Dispatch:
 
     def _look(self) -> None:
         try:
-            self._crew.look()
+            self._workers.look()
         except (OSError, TimeoutError) as error:
-            raise Stranded(
-                f"Dask scheduler {self._crew.scheduler}: gone, with {self._left} - start another, go on with --resume"
-            ) from error
-        if len(self._crew):
+            scheduler = f"Dask scheduler {self._workers.scheduler}"
+            raise Stranded(f"{scheduler}: gone, with {self._left} - start another, go on with --resume") from error
+        if len(self._workers):
             self._seen = time.monotonic()
         elif time.monotonic() > self._seen + self._patience:
             raise Stranded(
-                f"Dask scheduler {self._crew.scheduler}: no worker for {self._patience:g} s, with {self._left}"
-                f" - start some: dask worker {self._crew.scheduler} --nthreads 1"
+                f"Dask scheduler {self._workers.scheduler}: no worker for {self._patience:g} s, with {self._left}"
+                f" - start some: dask worker {self._workers.scheduler} --nthreads 1"
             )
 
     @property
@@ -98,11 +105,11 @@ class Dispatch:
 
     def _send(self, jobs: Iterator[Measure]) -> None:
         """One case to everyone who may have one."""
-        while (member := self._crew.free(attempt.member for attempt in self._attempts)) is not None:
+        while (member := self._workers.free(attempt.member for attempt in self._attempts)) is not None:
             if not self._waiting and not self._pull(jobs):
                 return
             job, lost = self._waiting.pop(0)
-            parcel = packed(sealed(job), self._limits, os.getcwd())
+            parcel = packed(shipped(job), self._limits, os.getcwd())
             with warnings.catch_warnings():
                 warnings.filterwarnings("ignore", "Sending large graph")  # references found before go along
                 future = sent(self._client, member.address, "carry", parcel, member.greeting.pid)
@@ -126,10 +133,10 @@ class Dispatch:
         except (CancelledError, KilledWorker):
             outcome, found = None, {}
         except Exception as error:  # of Dask or of the worker: the case itself tells in its row
-            row = failed(attempt.job.row, f"{attempt.job.row['route']} on worker {attempt.member.address}", error)
-            outcome, found = Outcome(row | {"host": attempt.member.greeting.hostname}), {}
+            who = f"{attempt.job.name} on worker {attempt.member.address}"
+            outcome, found = attempt.record.failed(error, who), {}
         if outcome is None:
-            self._crew.forget(attempt.member.address)
+            self._workers.forget(attempt.member.address)
             yield from self._lose(attempt)
             return
         self._attempts.remove(attempt)
@@ -145,7 +152,7 @@ class Dispatch:
                 self._look()
                 if attempt.future.status == "error":
                     raise
-                if attempt.member not in self._crew:
+                if attempt.member not in self._workers:
                     return None
             else:
                 return reply
@@ -160,17 +167,14 @@ class Dispatch:
             self._waiting.insert(0, (attempt.job, lost))
             return
         where = ", ".join(member.address for member in lost)
-        row = attempt.job.row | {
-            "status": "crashed",
-            "reason": f"{attempt.job.row['route']}: {len(lost)} workers were lost with it: {where} - see their logs",
-            "host": attempt.member.greeting.hostname,
-        }
-        yield self._signed(Outcome(row), attempt.member, ())
+        reason = f"{attempt.job.name}: {len(lost)} workers were lost with it: {where} - see their logs"
+        yield self._signed(attempt.record.ended(Status.CRASHED, reason), attempt.member, ())
 
     def _signed(self, outcome: Outcome, member: Member, lost: Lost) -> Outcome:
         """With the machine it comes from, if it does not tell itself, and what was lost on the way."""
         if lost:
-            note(outcome.row, f"begun {len(lost) + 1} times, workers were lost: {', '.join(m.address for m in lost)}")
+            said = f"begun {len(lost) + 1} times, workers were lost: {', '.join(m.address for m in lost)}"
+            outcome = replace(outcome, row=outcome.row | {"note": noted(outcome.row["note"], said)})
         if outcome.environment is None:
             return replace(outcome, environment=member.greeting.environment)
         return outcome

@@ -15,8 +15,9 @@ from distributed import Worker, get_worker
 from distributed.core import Status
 
 from gradient_routes.bench.cases.environment import Environment, environment
-from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.execution.cluster.shipped_case import Sealed
+from gradient_routes.bench.cases.outcome import Record
+from gradient_routes.bench.cases.status import Status as CaseStatus
+from gradient_routes.bench.execution.cluster.shipped_case import ShippedCase
 from gradient_routes.bench.execution.executors.isolated import Isolated
 from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -40,7 +41,7 @@ def greeting() -> Greeting:
     return Greeting(socket.gethostname(), os.getpid(), environment())
 
 
-def packed(case: Sealed, limits: Limits, cwd: str) -> bytes:
+def packed(case: ShippedCase, limits: Limits, cwd: str) -> bytes:
     """For carry; Dask looks into anything but bytes."""
     return pickle.dumps((case, limits, cwd))
 
@@ -54,10 +55,10 @@ def carry(parcel: bytes, pid: int) -> bytes | None:
         return None
     case, limits, cwd = pickle.loads(parcel)
     os.environ.pop("MALLOC_TRIM_THRESHOLD_", None)  # a nanny's, for its worker: it would slow down what cases allocate
-    case = replace(case, row=case.row | {"host": socket.gethostname(), "started": now()})
+    case = replace(case, asked=case.asked | {"host": socket.gethostname(), "started": now()})
     if not os.path.isdir(cwd):
-        what = f"no folder {cwd} on {case.row['host']} - start from one that all hosts have, or make it there"
-        outcome = Outcome(case.row | {"status": "failed", "reason": f"{case.row['route']}: {what}"})
+        what = f"no folder {cwd} on {case.asked['host']} - start from one that all hosts have, or make it there"
+        outcome = Record(case.asked).ended(CaseStatus.FAILED, f"{case.name}: {what}")
         return pickle.dumps((outcome, case.found))
     under_way = Isolated(case, limits, cwd)
     with while_wanted(under_way):

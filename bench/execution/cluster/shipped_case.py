@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
     from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.execution.isolation.channel import Channel
-    from gradient_routes.bench.execution.measure_job import Measure
+    from gradient_routes.bench.execution.measurement import Measure
     from gradient_routes.bench.execution.references import Found
 
 
 @dataclass(frozen=True)
-class Sealed:
+class ShippedCase:
     """Opened by the process that runs it and by no other: to open it imports the code of problem and route.
 
     parts  problem, route and settings, pickled
@@ -29,30 +29,30 @@ class Sealed:
 
     parts: bytes
     files: tuple[str, ...]
-    row: Row
+    asked: Row
     found: Found
 
     @property
     def name(self) -> str:
-        return str(self.row["route"])
+        return str(self.asked["route"])
 
     def __call__(self, channel: Channel) -> None:
+        from gradient_routes.bench.cases.case import Case
         from gradient_routes.bench.cases.environment import environment
         from gradient_routes.bench.cases.keys import witnesses
-        from gradient_routes.bench.cases.outcome import Outcome, failed
-        from gradient_routes.bench.execution.measure_job import Measure
+        from gradient_routes.bench.cases.outcome import Record
+        from gradient_routes.bench.execution.measurement import Measure
 
         try:
             problem, route, settings = pickle.loads(self.parts)
             checked_s = self._check(problem, route, settings.at)
         except InputError as error:
             channel.say(Begun(environment()))
-            row = failed(self.row, self.row["route"], error)
-            row["reason"] = f"{self.row['route']} on {self.row['host']}: {error}"
-            channel.say(Done(Outcome(row), {}))
+            reason = f"{self.name} on {self.asked['host']}: {error}"
+            channel.say(Done(Record(self.asked).failed(InputError(reason), self.name), {}))
             return
-        row = self.row | {"prepare_s": -checked_s}  # at home nobody checks: it is no part of the preparation
-        Measure(problem, route, settings, row, self.found, witnesses(problem, route, settings.at))(channel)
+        case = Case(problem, route, settings, self.asked)
+        Measure(case, self.found, witnesses(problem, route, settings.at), checked_s)(channel)
 
     def _check(self, problem: ProblemSpec, route: RouteSpec, at: str) -> float:
         """The seconds it took. Raises InputError where this host would compute something else."""
@@ -62,14 +62,15 @@ class Sealed:
         missing = [file for file in self.files if not os.path.isfile(file)]
         if missing:
             raise InputError(f"no file {missing[0]} in {os.getcwd()} - copy it there")
-        if content_key(self.row["case_key"], problem, route, at) != self.row["content_key"]:
+        if content_key(self.asked["case_key"], problem, route, at) != self.asked["content_key"]:
             raise InputError("its code, data or libraries are others than here - install and copy the same there")
         return time.perf_counter() - start
 
 
-def sealed(job: Measure) -> Sealed:
+def shipped(job: Measure) -> ShippedCase:
     """A case ready to travel."""
     from gradient_routes.bench.cases.case import files
 
-    parts = pickle.dumps((job.problem, job.route, job.settings))
-    return Sealed(parts, tuple(map(str, files([job.problem], job.settings.at))), job.row, job.found)
+    case = job.case
+    parts = pickle.dumps((case.problem, case.route, case.settings))
+    return ShippedCase(parts, tuple(map(str, files([case.problem], case.settings.at))), case.asked, job.found)

@@ -1,4 +1,4 @@
-"""Cases in this process, on one workbench a problem: nothing guards it, nothing is started."""
+"""Cases in this process, those on one problem in one context: nothing limits them, nothing is started."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import gc
 from collections.abc import Iterator
 from functools import cache
 
+from gradient_routes.bench.cases.case import Case
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
-from gradient_routes.bench.cases.outcome import Outcome, refused, unbuilt
+from gradient_routes.bench.cases.outcome import Outcome, Record
 from gradient_routes.bench.cases.status import FOREIGN
-from gradient_routes.bench.execution.case_context import Workbench
+from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.executors.running import interleaved
-from gradient_routes.bench.execution.measure_job import Measure
-from gradient_routes.bench.execution.measurement import Measurement, measure
+from gradient_routes.bench.execution.measurement import Measure, Measurement, measure
 from gradient_routes.problems.errors import DomainError, InputError
 
 
-class Here:
+class InProcess:
     """A case under way in this process."""
 
-    def __init__(self, bench: Workbench, job: Measure) -> None:
-        self._bench, self._job = bench, job
+    def __init__(self, context: CaseContext, case: Case) -> None:
+        self._context, self._case = context, case
         self._measured: Measurement | None = None
 
     @property
@@ -28,7 +28,7 @@ class Here:
         return self._measured is not None and self._measured.long
 
     def prepared(self) -> Outcome | None:
-        measured = measure(self._bench, self._job.route, self._job.row)
+        measured = measure(self._context, self._case, Record(self._case.asked))
         if isinstance(measured, Outcome):
             return measured
         self._measured = measured
@@ -47,17 +47,17 @@ class Here:
 
 def outcomes(jobs: list[Measure]) -> Iterator[Outcome]:
     """Of all routes on one problem."""
-    first = jobs[0]
+    first = jobs[0].case
     settle()
     try:
         with stdout_to_stderr():
-            bench = Workbench(first.problem, first.settings, first.found)
+            context = CaseContext(first.problem, first.settings, jobs[0].found)
     except (InputError, DomainError) as error:
-        yield from (refused(job.row, error) for job in jobs)
+        yield from (Record(job.asked).refused(error) for job in jobs)
     except FOREIGN as failure:
-        yield from (unbuilt(job.row, job.problem.name, failure) for job in jobs)
+        yield from (Record(job.asked).unbuilt(failure) for job in jobs)
     else:
-        yield from interleaved(Here(bench, job) for job in jobs)
+        yield from interleaved(InProcess(context, job.case) for job in jobs)
 
 
 @cache

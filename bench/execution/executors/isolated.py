@@ -7,11 +7,10 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
-from gradient_routes.bench.cases.outcome import Outcome, refused
+from gradient_routes.bench.cases.outcome import Outcome, Record
 from gradient_routes.bench.cases.status import Status
-from gradient_routes.bench.execution.cluster.shipped_case import Sealed
+from gradient_routes.bench.execution.cluster.shipped_case import ShippedCase
 from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.channel import Call
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -28,21 +27,21 @@ from gradient_routes.bench.execution.isolation.messages import (
     Turn,
     Turned,
 )
-from gradient_routes.bench.execution.isolation.stack import where
-from gradient_routes.bench.execution.measure_job import Measure
+from gradient_routes.bench.execution.isolation.stack import where as located
+from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.bench.execution.references import Found
 from gradient_routes.problems.errors import InputError, RoutesError
 
-Case = Measure | Sealed
+CaseJob = Measure | ShippedCase
 
 
 class Isolated:
     """A case under way in a process of its own; what it has said is known whatever becomes of it."""
 
-    def __init__(self, job: Case, limits: Limits, cwd: str | None = None) -> None:
+    def __init__(self, job: CaseJob, limits: Limits, cwd: str | None = None) -> None:
         self.found: Found = job.found
         self.long = False
-        self._row: Row = job.row
+        self._record = Record(job.asked)
         self._phase = "its start"
         self._environment: Environment | None = None
         self._ended: Outcome | None = None
@@ -87,8 +86,9 @@ class Isolated:
         match message:
             case Begun(environment):
                 self._environment = environment
-            case Known(phase, row):
-                self._phase, self._row = phase, row
+            case Known(phase, news):
+                self._phase = phase
+                self._record.add(news)
             case Ready(long, found):
                 self.long = long
                 self.found.update(found)  # for cases that are prepared before this one is done
@@ -98,23 +98,21 @@ class Isolated:
                 self._ended = outcome
                 self.found.update(found)
             case Ended(Status.REFUSED, reason):
-                self._ended = refused(self._row, InputError(reason))
+                self._ended = self._record.refused(InputError(reason))
             case Ended():
                 self._ended = self._died(message)
 
     def _died(self, end: Ended) -> Outcome:
         """What was known when it died is kept."""
-        error, status = self._row["gradient_error"], end.status
+        error, status = self._record.known.get("gradient_error"), end.status
         reason = end.reason
         if status in (Status.OK, Status.INTERRUPTED):
             status, reason = Status.CRASHED, "its process was told to end"
         known = "" if error is None else f"; its gradient was known by then, its error {error:.2g}"
-        row = self._row | {
-            "status": status,
-            "reason": f"{self._row['route']}: {status} in {self._phase}{where(end.stderr)}: {reason}{known}",
-            "traceback": end.traceback or None,
-        }
-        return Outcome(row, environment=self._environment)
+        where = f"{self._phase}{located(end.stderr)}"
+        self._record.add({"traceback": end.traceback or None})
+        reason = f"{self._record.asked['route']}: {status} in {where}: {reason}{known}"
+        return self._record.ended(status, reason, environment=self._environment)
 
 
 def called(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Limits) -> Any:
@@ -131,7 +129,7 @@ def called(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Lim
     raise RoutesError(f"{job.name}: {what}")
 
 
-def whole(job: Case, limits: Limits, cwd: str | None = None) -> Outcome:
+def whole(job: CaseJob, limits: Limits, cwd: str | None = None) -> Outcome:
     """A case from its start to its end, timed beside no other."""
     return finished(Isolated(job, limits, cwd))
 

@@ -10,7 +10,7 @@ from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.execution.executors.isolated import Isolated, finished
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.signals import Interrupt
-from gradient_routes.bench.execution.measure_job import Measure
+from gradient_routes.bench.execution.measurement import Measure
 
 TICK = 0.1  # [s] between two looks whether it is interrupted
 

@@ -30,10 +30,10 @@ class Begun:
 
 @dataclass(frozen=True)
 class Known:
-    """The phase of a case that begins, and its row so far."""
+    """The phase of a case that begins, and the columns that have become known since the last one."""
 
     phase: str
-    row: Row
+    news: Row
 
 
 @dataclass(frozen=True)

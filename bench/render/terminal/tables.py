@@ -11,13 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.case import selector_of
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.cases.options import options_of
-from gradient_routes.bench.cases.selector import written
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.render.terminal.terminal import Terminal
 from gradient_routes.bench.render.terminal.text_table import TextTable
-from gradient_routes.problems.errors import InputError
 
 PIPED_WIDTH = 160  # columns where there is no terminal to ask
 DEFAULTS = vars(Settings().solver)
@@ -67,12 +65,7 @@ def _narrow(table: Table, excess: int, unlimited: ConsoleOptions, out: Console) 
 
 def named(kind: registry.Kind, row: Row) -> str:
     """The selector of a row's problem or route, without its defaults."""
-    name, options = row[kind], row[f"{kind}_options"]
-    try:
-        factory = registry.factory_of(registry.find(kind, name).load())
-    except InputError:  # a stored row of a plug-in that is gone
-        return written(name, options, {})
-    return written(name, options, {n: o.default for n, o in options_of(factory).items()})
+    return selector_of(kind, row[kind], row[f"{kind}_options"])
 
 
 def titled(row: Row) -> str:

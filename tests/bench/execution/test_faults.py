@@ -254,10 +254,10 @@ def test_no_terminal_is_too_narrow_for_the_numbers(columns: int, tmp_path: Path)
 def test_the_point_handed_to_routes_is_read_only() -> None:
     from gradient_routes.bench.cases.case import problems
     from gradient_routes.bench.cases.settings import Settings
-    from gradient_routes.bench.execution.case_context import Workbench
+    from gradient_routes.bench.execution.case_context import CaseContext
 
     (spec,) = problems(["bar"])
-    p = Workbench(spec, Settings()).p
+    p = CaseContext(spec, Settings()).p
     assert not p.flags.writeable
     np.testing.assert_array_equal(p, np.zeros(8))
 

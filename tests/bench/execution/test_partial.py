@@ -10,15 +10,13 @@ from conftest import ROUTES, somewhere
 from duffing.problem import Duffing
 from test_routes import ACCURACY, ZOO, differentiate, ids, pairs, reference, without_iterations
 
-from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.case import Case, ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.partial import Partial
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution import references as accuracy
-from gradient_routes.bench.execution.case_context import Workbench
-from gradient_routes.bench.execution.executors.in_process import Here
+from gradient_routes.bench.execution.case_context import CaseContext
+from gradient_routes.bench.execution.executors.in_process import InProcess
 from gradient_routes.bench.execution.executors.running import alone
-from gradient_routes.bench.execution.measure_job import Measure
-from gradient_routes.bench.execution.measurement import begun_row
 from gradient_routes.bench.execution.references import Judge, Judges, error
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
@@ -256,17 +254,16 @@ class BlackBox(Problem):
         return float(np.sin(p).sum())
 
 
-def outcome(bench: Workbench, route: Route):
+def outcome(bench: CaseContext, route: Route):
     spec = RouteSpec(route.name, route, route.defaults)
-    job = Measure(bench.spec, spec, bench.settings, begun_row(bench.spec, spec, bench.settings), {})
-    case = Here(bench, job)
+    case = InProcess(bench, Case(bench.spec, spec, bench.settings, {"route": route.name}))
     return case.prepared() or alone(case)
 
 
 def test_an_unknown_error_says_why() -> None:
-    row = outcome(Workbench(ProblemSpec("box", {}, BlackBox), Settings(min_time=0.0)), fd_central).row
+    row = outcome(CaseContext(ProblemSpec("box", {}, BlackBox), Settings(min_time=0.0)), fd_central).row
     assert (row["status"], row["gradient_error"], row["reference"]) == ("ok", None, None)
-    assert "fd-central: error unknown, nobody judges: complex-step needs" in row["note"]
+    assert "fd-central: error unknown, no reference: complex-step needs" in row["note"]
     assert "tangent needs" in row["note"]
 
 
@@ -282,7 +279,7 @@ def test_a_judge_too_dear_says_so() -> None:
 @pytest.mark.parametrize("build", [BlackBox, Long, Duffing, lambda: Block(n=2)], ids=["box", "bar", "duffing", "block"])
 def test_partial_rows_of_every_kind(build: Callable[..., Problem], kind: str) -> None:
     part = Partial(kind, 1, seed=3)
-    bench = Workbench(ProblemSpec("test", {}, build), Settings(min_time=0.0, partial=part))
+    bench = CaseContext(ProblemSpec("test", {}, build), Settings(min_time=0.0, partial=part))
     problem, n_p = bench.problem, bench.n_p
     for route in ROUTES:
         if route.objection(problem) is not None:

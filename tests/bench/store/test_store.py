@@ -17,8 +17,10 @@ import pandas as pd
 import pytest
 from commands import shell
 
+from gradient_routes.bench.cases.column import Column
 from gradient_routes.bench.cases.row import COLUMNS, SAMPLES, STORED, empty_row
 from gradient_routes.bench.cases.samples import Samples
+from gradient_routes.bench.store.schema import KEY, tables
 from gradient_routes.bench.store.store import SCHEMA, Store
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.tally import KINDS
@@ -74,6 +76,19 @@ def test_a_store_of_an_older_schema_gets_the_tables_of_studies(tmp_path: Path) -
     assert store.rows() == [row()]
     with closing(sqlite3.connect(store.path)) as db:
         assert db.execute("PRAGMA user_version").fetchone()[0] == SCHEMA
+
+
+def test_a_study_installed_later_gets_its_tables_and_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the number of the schema, which is that of this project's own tables."""
+    store, known = Store(tmp_path / "s.sqlite"), tables()
+    store.append(row(), None)
+    x, y = Column("x", "REAL", "m", "a length"), Column("y", "TEXT", "", "an object", json=True)
+    for columns in ((x,), (x, y)):
+        new = known | {"installed": (KEY, *columns)}
+        monkeypatch.setattr("gradient_routes.bench.store.store.tables", lambda new=new: new)
+        store.append_study({"installed": [{"x": 1.0, "y": {"z": 2}}]}, "today")
+    assert [(r["x"], r["y"]) for r in store.records("installed")] == [(1.0, None), (1.0, {"z": 2})]
+    assert store.rows() == [row()]
 
 
 def test_the_store_is_append_only_and_counts_up(cli) -> None:
