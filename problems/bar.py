@@ -126,6 +126,7 @@ class Bar(Problem):
     def _look(self) -> None:
         """What the sensors leave unseen."""
         self.last_sensor = int(self.sensors.nodes.max(initial=0))
+        self.typical = min(3, self.last_sensor) - 1 if self.last_sensor else None  # loaded elements on both sides of it
         self.notes = self._notes()
 
     def _meet(self, stop: Stop | None) -> None:
@@ -140,6 +141,10 @@ class Bar(Problem):
         other._meet(stop)
         other.notes = other._notes()
         return other
+
+    def tip(self, u: Array) -> float:
+        """u_N [m]."""
+        return float(u[self.n - 1])
 
     def refined(self, p: Array) -> tuple[Bar, Array] | None:
         """Every element in two, the same data at the same places."""

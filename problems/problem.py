@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered
 
 if TYPE_CHECKING:
+    from gradient_routes.problems.contact import Stop
     from gradient_routes.problems.data.observation import Candidates, Observation
     from gradient_routes.problems.data.regularization import Prior
 
@@ -28,9 +29,10 @@ Structure = Literal["spd", "symmetric", "general"]
 
 
 class Offers(enum.Flag):
-    """What a problem offers and a route needs. SOLVE contains VALUE, LINEARIZE contains SOLVE.
+    """What a problem offers, and a route or a study needs. SOLVE contains VALUE, LINEARIZE contains SOLVE.
 
     Every bit has a name, STATE and PARTIALS included: Python 3.11.2 drops bits that have none.
+    From OBSERVATION on: one bit a method, set where a class overrides that method of Problem.
     """
 
     VALUE = 1
@@ -40,8 +42,22 @@ class Offers(enum.Flag):
     LINEARIZE = SOLVE | PARTIALS
     TRACE = 8
     COMPLEX = 16
+    OBSERVATION = 32
+    ACTIVE_SET = 64
+    REFINED = 128
+    INTEGRAL = 256
+    CONTINUOUS_ADJOINT = 512
+    FIELDS = 1024
 
 
+OPTIONAL = (
+    Offers.OBSERVATION,
+    Offers.ACTIVE_SET,
+    Offers.REFINED,
+    Offers.INTEGRAL,
+    Offers.CONTINUOUS_ADJOINT,
+    Offers.FIELDS,
+)
 OFFERED_AS = {
     Offers.VALUE: "J(p) as a number",
     Offers.SOLVE: "R(u, p), R_u and J(u, p) as numbers",
@@ -176,7 +192,8 @@ class Problem:
 
     name       as in selectors
     parameters what p is
-    offers     what the methods below provide; a route needing more is skipped with a reason
+    offers     what the methods below provide; a route needing more is skipped with a reason. OPTIONAL members are
+               added for the methods of their names that a class overrides
     n_state    n_u, the number of free unknowns (0 for a black box)
     linear     R is affine in u: one Newton step solves it
     offset     |X| where R is a function of X + u, as positions are: rounding is then relative to that
@@ -187,6 +204,9 @@ class Problem:
                Rheinboldt 1970, 13.3.4) or an active-set search ending: halving steps would only get in the way
     affine     u is an affine function of p: R is affine in u and p is a load
     regularization  the prior whose weight is alpha, where there may be one
+    stop       of a state that meets an obstacle: the contact law, None where there is none
+    typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
+               no one in particular
     notes      sentences a user should read beside the result
     """
 
@@ -202,7 +222,16 @@ class Problem:
     line_search: bool = True
     affine: bool = False
     regularization: Prior | None = None
+    stop: Stop | None = None
+    typical: int | None = None
     notes: tuple[str, ...] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for offer in OPTIONAL:
+            method = str(offer.name).lower()
+            if getattr(cls, method) is not getattr(Problem, method):
+                cls.offers |= offer
 
     def value(self, p: Array) -> float:
         """J(p), for a black box that offers VALUE only."""
@@ -286,6 +315,14 @@ class Problem:
     def active_set(self, u: Array, p: Array) -> Hashable | None:
         """Which smooth branch of a piecewise smooth R holds at (u, p), a word or a tuple; None where R is smooth."""
         return None
+
+    def tip(self, u: Array) -> float | None:
+        """The displacement [m] that `stop` limits; None where there is nothing to limit."""
+        return None
+
+    def behind(self, stop: Stop) -> Problem:
+        """This problem, its data and its mesh, with another stop."""
+        raise NotOffered(f"{self.name}: has no stop to exchange")
 
     def refined(self, p: Array) -> tuple[Problem, Array] | None:
         """The same problem on a mesh of half the size, and p there; None where it has no such mesh."""

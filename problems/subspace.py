@@ -1,10 +1,10 @@
-"""A problem seen through a few directions: p = base + V c. Every route then runs on c as it runs on p."""
+"""A problem in an affine subspace of its parameters: p = base + V c. Routes run on c as they run on p."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,11 @@ from gradient_routes.problems.problem import (
     Reference,
     Traced,
 )
+from gradient_routes.problems.wrapped import Wrapped
+
+if TYPE_CHECKING:
+    from gradient_routes.problems.contact import Stop
+    from gradient_routes.problems.data.observation import Observation
 
 
 @dataclass(frozen=True)
@@ -80,44 +85,29 @@ class Coordinates(Parameters):
         return c
 
 
-class Restricted(Problem):
+class Subspace(Wrapped):
     """`problem` as a function of c (m,) alone, p = base + V c; its gradient is V^T dJ/dp.
 
     V (n_p, m) is a dense array for directions, a Selection for components; see the two functions below.
     """
 
+    typical = None
+
     def __init__(self, problem: Problem, V: Operator, base: Array, **parameters: Any) -> None:
-        self.problem, self.V, self.base = problem, V, base
-        self.name, self.notes = problem.name, problem.notes
-        self.offers, self.structure, self.linear = problem.offers, problem.structure, problem.linear
-        self.n_state, self.offset, self.matrix_free = problem.n_state, problem.offset, problem.matrix_free
-        self.load_steps, self.line_search = problem.load_steps, problem.line_search
+        super().__init__(problem)
+        self.V, self.base, self._given = V, base, parameters
         self.parameters = Coordinates(**parameters, p=self.p, of=problem.parameters)
 
     def p(self, c: Any) -> Any:
         """p (n_p,) at c (m,); traceable."""
         return self.base + self.V @ c
 
-    def value(self, p: Array) -> float:
-        return self.problem.value(self.p(p))
-
-    def initial(self, p: Array) -> Array:
-        return self.problem.initial(self.p(p))
-
-    def residual(self, u: Array, p: Array) -> Array:
-        return self.problem.residual(u, self.p(p))
-
-    def tangent(self, u: Array, p: Array) -> Any:
-        return self.problem.tangent(u, self.p(p))
-
-    def tangent_operator(self, u: Array, p: Array) -> Operator:
-        return self.problem.tangent_operator(u, self.p(p))
-
-    def objective(self, u: Array, p: Array) -> Any:
-        return self.problem.objective(u, self.p(p))
+    def _of(self, problem: Problem) -> Subspace:
+        """The same subspace of a problem with the same parameters."""
+        return Subspace(problem, self.V, self.base, **self._given)
 
     def linearize(self, u: Array, p: Array) -> Linearization:
-        lin = self.problem.linearize(u, self.p(p))
+        lin = super().linearize(u, p)
         return Linearization(Product(lin.R_p, self.V), lin.J_u, self.V.T @ lin.J_p)
 
     def traced(self) -> Traced:
@@ -131,29 +121,68 @@ class Restricted(Problem):
         )
 
     def reference(self, p: Array) -> Reference | None:
-        """|V| times the size of the whole: no sum of its terms by V is larger."""
-        inner = self.problem.reference(self.p(p))
+        """Its size is at most |V| times that of the whole gradient."""
+        inner = super().reference(p)
         if inner is None:
             return None
         norm = 1.0 if isinstance(self.V, Selection) else float(np.linalg.norm(np.asarray(self.V)))
         return Reference(inner.name, self.V.T @ inner.gradient, norm * inner.size)
 
-    def active_set(self, u: Array, p: Array) -> Hashable | None:
-        return self.problem.active_set(u, self.p(p))
+    def observation(self, u: Array, p: Array) -> Observation | None:
+        inner = super().observation(u, p)
+        return inner if inner is None or inner.S_p is None else replace(inner, S_p=Product(inner.S_p, self.V))
 
-    def condition(self, p: Array) -> float | None:
-        return self.problem.condition(self.p(p))
+    def continuous_adjoint(self, u: Array, p: Array) -> tuple[Any, Operator] | None:
+        inner = super().continuous_adjoint(u, p)
+        return None if inner is None else (inner[0], Product(inner[1], self.V))
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         """The rows of the components; a direction has none."""
         if not isinstance(self.V, Selection):
             return ParameterView()
-        inner = self.problem.view(self.p(p), u, lam)
+        inner = super().view(p, u, lam)
         columns = {name: self.V.T @ column for name, column in inner.columns.items()}
         return ParameterView(columns, None if inner.blind is None else self.V.T @ inner.blind, inner.mark)
 
+    def truth(self) -> Array | None:
+        """None where the true p is not in the subspace."""
+        truth = self.problem.truth()
+        if truth is None:
+            return None
+        V = self.V
+        c = (V.T @ truth) if isinstance(V, Selection) else np.linalg.lstsq(np.asarray(V), truth - self.base)[0]
+        return c if np.allclose(self.p(c), truth, rtol=1e-12, atol=0.0) else None
 
-def components(problem: Problem, p: Array, index: Array) -> Restricted:
+    def twin(self) -> Problem | None:
+        twin = self.problem.twin()
+        return None if twin is None else self._of(twin)
+
+    def observed(self, u: Array, seed: int | None = None) -> Problem:
+        return self._of(self.problem.observed(u, seed))
+
+    def weighted(self, alpha: float) -> Problem:
+        return self._of(self.problem.weighted(alpha))
+
+    def behind(self, stop: Stop) -> Problem:
+        return self._of(self.problem.behind(stop))
+
+    def load_cases(self) -> list[Problem]:
+        return [self._of(one) for one in self.problem.load_cases()]
+
+    def prior(self, p: Array) -> None:
+        """A prior of all of theta is none of c."""
+        return
+
+    def refined(self, p: Array) -> None:
+        """A finer mesh has other parameters than V knows."""
+        return
+
+    def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> None:
+        """A part of a gradient is no field."""
+        return
+
+
+def components(problem: Problem, p: Array, index: Array) -> Subspace:
     """The problem in the components `index` (m,) of p, the others held: c_j = p_index[j] with its scale and bounds.
 
     Finite differences therefore take the steps they would take in the whole gradient.
@@ -162,7 +191,7 @@ def components(problem: Problem, p: Array, index: Array) -> Restricted:
     base = p.copy()
     base[V.index] = 0.0  # V c is added to it, and 0 + c is c without rounding
     lower, upper = (np.broadcast_to(bound, p.shape)[V.index] for bound in (of.lower, of.upper))
-    return Restricted(
+    return Subspace(
         problem,
         V,
         base,
@@ -176,7 +205,7 @@ def components(problem: Problem, p: Array, index: Array) -> Restricted:
     )
 
 
-def directions(problem: Problem, p: Array, m: int, seed: int) -> Restricted:
+def directions(problem: Problem, p: Array, m: int, seed: int) -> Subspace:
     """The problem along m random directions v_i = xi_i max(|p_i|, s_i) from p, where c = 0.
 
     xi_i has either sign and a size of 1/2 to 3/2, so that no direction misses a component, as normal numbers may.
@@ -187,7 +216,7 @@ def directions(problem: Problem, p: Array, m: int, seed: int) -> Restricted:
     xi = rng.choice([-1.0, 1.0], (m, len(p))) * rng.uniform(0.5, 1.5, (m, len(p)))
     V = (xi * of.natural(p)).T
     lower, upper = _room(p, V, of)
-    return Restricted(
+    return Subspace(
         problem,
         V,
         p,

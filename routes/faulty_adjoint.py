@@ -40,14 +40,14 @@ def check(*, fault: str, component: int | None) -> None:
 
 def missing(problem: Problem, *, fault: str, component: int | None) -> str | None:
     lacks = {
-        "functional": (type(problem).integral is Problem.integral, "a J that stands for an integral"),
-        "otd": (type(problem).continuous_adjoint is Problem.continuous_adjoint, "an adjoint equation of its own"),
+        "functional": (Offers.INTEGRAL not in problem.offers, "a J that stands for an integral"),
+        "otd": (Offers.CONTINUOUS_ADJOINT not in problem.offers, "an adjoint equation of its own"),
         "scale": (not problem.parameters.unit_of(0).startswith("log"), "parameters that are logarithms"),
     }
     lacking, what = lacks.get(fault, (False, ""))
     if component is not None and component > len(problem.parameters):
         return f"faulty-adjoint[component={component}]: {problem.name} has {len(problem.parameters)} parameters"
-    return f"faulty-adjoint[fault={fault}] needs {what}, which {problem.name} has not" if lacking else None
+    return f"faulty-adjoint[fault={fault}] needs {what}, which {problem.name} does not have" if lacking else None
 
 
 @route("faulty-adjoint", needs=Offers.LINEARIZE, cost=cost, check=check, missing=missing, sound=False)

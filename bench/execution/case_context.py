@@ -35,7 +35,7 @@ class Workbench:
         self.build_s, self.problem = seconds_of(spec)
         self.p = point(self.problem, settings.at)
         self.n_p = len(self.p)
-        if settings.fields and type(self.problem).fields is Problem.fields:
+        if settings.fields and Offers.FIELDS not in self.problem.offers:
             raise InputError(f"{self.problem.name}: has no mesh to write fields on - drop --vtu")
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes

@@ -77,7 +77,7 @@ def _more(options: Options, factor: float) -> Options:
 
 def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable] | None:
     """Of the state at p; None where the problem has none."""
-    if Offers.SOLVE not in problem.offers or type(problem).active_set is Problem.active_set:
+    if Offers.SOLVE | Offers.ACTIVE_SET not in problem.offers:
         return None
     model = Model(problem, solver)
 
@@ -94,7 +94,7 @@ def _refined(
     problem: Problem, route: Route, options: Options, p: Array, solver: Solver
 ) -> Callable[[], Subject | None] | None:
     """The route on the problem with half the mesh size. Raises InputError where that has too many unknowns."""
-    if type(problem).refined is Problem.refined:
+    if Offers.REFINED not in problem.offers:
         return None
 
     def refine() -> Subject | None:

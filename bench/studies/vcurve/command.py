@@ -18,7 +18,6 @@ from gradient_routes.problems.errors import InputError, NotConverged, SingularMa
 
 if TYPE_CHECKING:
     from gradient_routes.bench.verification.plan import Plan
-    from gradient_routes.problems.problem import Problem
     from gradient_routes.routes.newton import Solver
 
 LONGEST = 12  # digits of a number that are read
@@ -75,7 +74,8 @@ def vcurve(
     checked(budget)
     started, route_spec = now(), one_route(route)
     made, p = built(one_problem(problem), at)
-    few = _default(made) if components is None else _components(components, len(p))
+    few: int | tuple[int, ...] = FEW if made.typical is None else (made.typical,)
+    few = few if components is None else _components(components, len(p))
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     looked_at = subject(made, route_spec.route, route_spec.options, p, solver)
     with suppress(NotConverged, SingularMatrix):  # a solve that fails is part of the verdict
@@ -87,15 +87,6 @@ def vcurve(
     what = {"problem": problem, "route": route, "at": at}
     code = conclude(found, what, started, as_json=as_json, no_plot=no_plot, html=html, kept=kept)
     raise click.exceptions.Exit(code)
-
-
-def _default(problem: Problem) -> int | tuple[int, ...]:
-    """Element min(3, M) of a bar whose first M nodes carry sensors: it has some behind it and some before."""
-    from gradient_routes.problems.bar import Bar
-
-    if isinstance(problem, Bar) and problem.last_sensor:
-        return (min(3, problem.last_sensor) - 1,)
-    return FEW
 
 
 def _components(text: str, n_p: int) -> int | tuple[int, ...]:
