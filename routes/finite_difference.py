@@ -52,6 +52,7 @@ def near(forward: ForwardWork, start: str) -> Callable[[int, float], Work]:
     check=check,
     missing=missing,
     accuracy=SCATTER * ONE_SIDED,
+    step=ONE_SIDED,
 )
 def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p)) / h_i,  h_i = sqrt(eps) max(|p_i|, s_i)."""
@@ -69,6 +70,7 @@ def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Star
     check=check,
     missing=missing,
     accuracy=SCATTER * CENTRAL**2,
+    step=CENTRAL,
 )
 def fd_central(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p - h_i e_i)) / 2 h_i,  h_i = cbrt(eps) max(|p_i|, s_i)."""

@@ -69,6 +69,20 @@ class Model:
         """
         return state.factors if self.problem.linear else self.factorize(self.tangent(state.u, state.p))
 
+    def negative_eigenvalues(self, state: State) -> int | None:
+        """How many eigenvalues of a symmetric R_u are negative at a solved state, 0 where it is stable; None: unknown.
+
+        From the factors of the last Newton step, which is small; after inexact steps, which keep factors of an earlier
+        iterate, from new ones.
+        """
+        factors = state.factors if state.rate is None else self.factors_at(state)
+        return factors.negative_eigenvalues
+
+    def noise(self, state: State) -> float:
+        """|dJ| of one more full Newton step from a solved state: how far the tolerance of the solve leaves J open."""
+        du = self.solve_linear(self.factors_at(state), self.residual(state.u, state.p))
+        return float(abs(self.problem.objective(state.u - du, state.p) - state.J))
+
     def tangent_operator(self, state: State) -> Any:
         """R_u at a solved state for products only: matrix-free where the problem can, else assembled."""
         if self.problem.matrix_free:

@@ -24,6 +24,7 @@ class Result(NamedTuple):
     residual  |R(u, p)|_inf achieved there, relative to |R(u_0, p)|_inf
     lam       adjoint state (n_u,), R_u^T lam = -J_u, where the route has one
     tape      bytes held between the forward and the backward sweep of AD
+    du_dp     (n_u, k), columns of du/dp that were asked for
     """
 
     J: float | None
@@ -32,6 +33,7 @@ class Result(NamedTuple):
     residual: float | None = None
     lam: Array | None = None
     tape: int | None = None
+    du_dp: Array | None = None
 
 
 Gradient = Callable[[Array], Result]
@@ -68,6 +70,7 @@ class Route:
     tape      (problem, **options) -> bytes the AD tape is predicted to need for its iterations; None if unknown
     sound     False for one that is wrong on purpose, which `all` leaves out
     accuracy  relative error its gradients have by nature on well-scaled problems; 0: that of the solver
+    step      of differences of J, relative to max(|p_i|, scale_i): noise of J is divided by it; None: it takes none
     """
 
     name: str
@@ -82,6 +85,7 @@ class Route:
     tape: Callable[..., int | None] | None = None
     sound: bool = True
     accuracy: float = 0.0
+    step: float | None = None
 
     @property
     def summary(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
-from gradient_routes.routes.linearized_solve import LinearizedSolver
+from gradient_routes.routes.linearized_solve import LinearizedSolver, state_derivatives
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 
@@ -74,6 +74,41 @@ class Sensitivity:
     def readings(self, at: Array) -> Array:
         """du/dp diag(scale) of the unknowns `at` (k,), (k, n_p)."""
         return np.stack([self.state(self.scale * e)[at] for e in units(self.shape[1])], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Columns of the derivatives of a solved state, and of what is observed of it, by the parameters.
+
+    components (k,)  numbers i of the parameters p_i, counted from 0
+    du_dp (n_u, k)   [unit of u / unit of p_i]
+    dSu_dp (m, k)    of the readings S u, without the weights of the misfit [unit of the data / unit of p_i]; None where
+                     the problem observes nothing
+    """
+
+    components: Array
+    du_dp: Array
+    dSu_dp: Array | None
+
+
+def sensitivities(model: Model, state: State, components: Array | None = None) -> Sensitivities:
+    """du/dp and d(S u)/dp = S_u du/dp + S_p at a solved state, for some components of p [all], by one solve each:
+
+        R_u du/dp_i = -R_p e_i
+
+    R_u is factorized at the state. All columns together take 8 n_u k bytes.
+    """
+    n_p = len(state.p)
+    at = np.arange(n_p) if components is None else np.asarray(components)
+    R_u, R_p = LinearizedSolver(model, state, "fresh"), model.linearize(state).R_p
+    du_dp = np.stack([*state_derivatives(R_u, R_p, at)], axis=1)
+    seen = model.problem.observation(state.u, state.p)
+    if seen is None:
+        return Sensitivities(at, du_dp, None)
+    dSu_dp = seen.S_u @ du_dp
+    if seen.S_p is not None:
+        dSu_dp = dSu_dp + np.stack([seen.S_p @ (np.arange(n_p) == i).astype(float) for i in at], axis=1)
+    return Sensitivities(at, du_dp, np.asarray(dSu_dp) / seen.weight)
 
 
 @dataclass(frozen=True)

@@ -218,5 +218,11 @@ def _weigh(
     state = bench.price()[1]
     if state is not None:
         row |= {"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)}
-        if bench.problem.structure == "spd" and "L D L^T" in state.factors.name:
-            note(row, "R_u is not positive definite at u: factorized as L D L^T (an unstable state, buckled say)")
+        unstable = model.negative_eigenvalues(state) if bench.problem.structure == "spd" else None
+        if unstable:
+            some = f"{unstable} negative eigenvalue{'s' if unstable > 1 else ''}"
+            note(row, f"R_u has {some} at u: the state is unstable")
+        if model.inexact and route.step is not None:
+            step = options.get("step") or route.step
+            noise = f"rtol {model.solver.rtol:g}, noise of J about {model.noise(state):.1g} over steps of {step:.1g}"
+            note(row, f"{route.name}: differences J of an inexact Newton solve ({noise}): use --newton full")
