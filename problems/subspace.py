@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Selection:
-    """The (n_p, m) matrix of the columns `index` (m,) of the identity, of which nothing but `index` is stored."""
+    """The (n_p, m) matrix of the columns `index` (m,) of the identity; only `index` is stored."""
 
     index: Array
     n_p: int
@@ -37,7 +37,7 @@ class Selection:
         return SelectionTransposed(self)
 
     def __matmul__(self, c: Any) -> Any:
-        """c (m,) spread over n_p components; traceable."""
+        """c (m,) scattered into n_p components; traceable."""
         if isinstance(c, np.ndarray):
             v = np.zeros(self.n_p, c.dtype)
             v[self.index] = c
@@ -74,7 +74,7 @@ class Product:
 
 @dataclass(frozen=True)
 class Coordinates(Parameters):
-    """c (m,) of p = base + V c: inside its domain where it is within its bounds and p within those of p."""
+    """c (m,) of p = base + V c. It is valid where c is within its bounds and p(c) within those of p."""
 
     p: Callable[[Array], Array] = field(kw_only=True)
     of: Parameters = field(kw_only=True)
@@ -185,11 +185,11 @@ class Subspace(Wrapped):
 def components(problem: Problem, p: Array, index: Array) -> Subspace:
     """The problem in the components `index` (m,) of p, the others held: c_j = p_index[j] with its scale and bounds.
 
-    Finite differences therefore take the steps they would take in the whole gradient.
+    Finite differences therefore take the same steps as in the whole gradient.
     """
     of, V = problem.parameters, Selection(np.asarray(index), len(p))
     base = p.copy()
-    base[V.index] = 0.0  # V c is added to it, and 0 + c is c without rounding
+    base[V.index] = 0.0  # 0 + c = c without rounding
     lower, upper = (np.broadcast_to(bound, p.shape)[V.index] for bound in (of.lower, of.upper))
     return Subspace(
         problem,
@@ -208,8 +208,8 @@ def components(problem: Problem, p: Array, index: Array) -> Subspace:
 def directions(problem: Problem, p: Array, m: int, seed: int) -> Subspace:
     """The problem along m random directions v_i = xi_i max(|p_i|, s_i) from p, where c = 0.
 
-    xi_i has either sign and a size of 1/2 to 3/2, so that no direction misses a component, as normal numbers may.
-    The bounds of c_j are those that p + v_j c_j keeps; several c_j at once may leave p's domain within them.
+    xi_i has a random sign and a size of 1/2 to 3/2, so that no component of a direction is nearly zero.
+    The bounds of c_j keep p + v_j c_j within the bounds of p; several c_j together may leave them.
     """
     of = problem.parameters
     rng = np.random.default_rng(seed)
@@ -229,7 +229,7 @@ def directions(problem: Problem, p: Array, m: int, seed: int) -> Subspace:
 
 
 def _room(p: Array, V: Array, of: Parameters) -> tuple[Array, Array]:
-    """The largest open intervals (m,) of c_j about 0 on which p + v_j c_j stays within its bounds."""
+    """The largest open intervals (m,) of c_j about 0 in which p + v_j c_j is within the bounds of p."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = [(np.broadcast_to(bound, p.shape) - p)[:, None] / V for bound in (of.lower, of.upper)]
     below, above = np.fmin(*ends), np.fmax(*ends)

@@ -16,7 +16,7 @@ from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.solvers.superlu import SparseFactorization
-from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, ChainFactorization
+from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, TridiagonalFactorization
 
 
 class Factorizer:
@@ -36,7 +36,7 @@ class Factorizer:
         if self.solver.takes(A):
             return self._factorize(A, who)
         if isinstance(A, Chain):
-            return ChainFactorization(A, who)
+            return TridiagonalFactorization(A, who)
         if isinstance(A, Bordered):
             return BorderedFactorization(A, who)
         return DenseFactorization(A, who) if isinstance(A, np.ndarray) else SparseFactorization(A, who)
