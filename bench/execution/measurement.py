@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from statistics import median
 from typing import Any
@@ -24,8 +24,10 @@ from gradient_routes.bench.execution.references import Judge, norm2
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.execution.worker import Channel
 from gradient_routes.bench.units import duration, now
+from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State
 from gradient_routes.routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
@@ -218,11 +220,17 @@ def _weigh(
     state = bench.price()[1]
     if state is not None:
         row |= {"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)}
-        unstable = model.negative_eigenvalues(state) if bench.problem.structure == "spd" else None
-        if unstable:
-            some = f"{unstable} negative eigenvalue{'s' if unstable > 1 else ''}"
-            note(row, f"R_u has {some} at u: the state is unstable")
-        if model.inexact and route.step is not None:
-            step = options.get("step") or route.step
-            noise = f"rtol {model.solver.rtol:g}, noise of J about {model.noise(state):.1g} over steps of {step:.1g}"
-            note(row, f"{route.name}: differences J of an inexact Newton solve ({noise}): use --newton full")
+        with suppress(RoutesError):  # a state at which R_u is singular has no such numbers
+            _note_state(bench, route, options, model, state, row)
+
+
+def _note_state(bench: Workbench, route: Route, options: Options, model: Model, state: State, row: Row) -> None:
+    """Notes on an unstable state, and on differences of J where the solver leaves noise in it."""
+    unstable = model.negative_eigenvalues(state) if bench.problem.structure == "spd" else None
+    if unstable:
+        some = f"{unstable} negative eigenvalue{'s' if unstable > 1 else ''}"
+        note(row, f"R_u has {some} at u: the state is unstable")
+    if model.inexact and route.step is not None:
+        step = options.get("step") or route.step
+        noise = f"rtol {model.solver.rtol:g}, noise of J about {model.noise(state):.1g} over steps of {step:.1g}"
+        note(row, f"{route.name}: differences J of an inexact Newton solve ({noise}): use --newton full")

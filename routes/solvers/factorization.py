@@ -69,11 +69,14 @@ class DenseFactorization(Factorization):
 
     @property
     def negative_eigenvalues(self) -> int | None:
-        """Of the eigenvalues themselves: pivots of L U do not tell."""
+        """By L D L^T of Bunch & Kaufman, D being block diagonal with blocks up to 2 x 2: pivots of L U do not tell."""
+        from scipy.linalg import eigvalsh_tridiagonal, ldl
+
         A = self._A
         if np.iscomplexobj(A) or not np.allclose(A, A.T, rtol=1e-12, atol=0.0):
             return None
-        return int((np.linalg.eigvalsh(A) < 0.0).sum())
+        D = ldl(A)[1]
+        return int((eigvalsh_tridiagonal(np.diag(D), np.diag(D, -1)) < 0.0).sum())
 
 
 class BlockFactorization(Factorization):

@@ -48,6 +48,7 @@ def test_sparse_factors_count_negative_eigenvalues(linear_solver: str, quantile:
         Bordered(np.array([1.0, 2.0]), 1.0, True),
         Bordered(np.array([1.0, 2.0]), 2.0, False),
         np.diag([1.0, -2.0, -3.0]) + 0.1,
+        np.array([[0.0, 1.0, 2.0], [1.0, 0.0, 3.0], [2.0, 3.0, 0.0]]),  # pivots of 2 x 2
     ],
 )
 def test_chains_and_dense_matrices_count_theirs(A) -> None:
@@ -107,3 +108,12 @@ def test_differences_of_inexact_solves_are_noted(cli, newton: str) -> None:
     says = "fd-one-sided: differences J of an inexact Newton solve (rtol 1e-12, noise of J about "
     assert (says in (rows["fd-one-sided"]["note"] or "")) == (newton == "inexact")
     assert "use --newton full" not in (rows["adjoint"]["note"] or "")
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-5])
+def test_the_noise_of_a_solve_is_its_distance_from_the_solution(rtol: float) -> None:
+    p = BLOCK.parameters.start
+    model = Model(BLOCK, Solver(rtol=rtol, newton="inexact"))
+    state, exact = model.solve(p), Model(BLOCK, Solver(rtol=1e-14)).solve(p)
+    assert model.noise(state) == pytest.approx(abs(state.J - exact.J), rel=0.1)
+    assert model.noise(state) > 1e-14 * abs(exact.J)
