@@ -24,6 +24,7 @@ from gradient_routes.bench.studies.tolerance.view import remarks
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.routes.solvers.iterative import DESCENT, solver
+from gradient_routes.routes.solvers.registry import linear_solver
 
 ROUGH = "bar[n=24,sensors=24,noise=0.01]"  # at its true moduli conjugate gradients take many steps, not n
 
@@ -110,7 +111,10 @@ def test_what_cannot_run_or_fails_is_a_row_with_its_reason(monkeypatch) -> None:
     (line,) = remarks(singular.rows)
     assert line.plain.startswith("failed at 0.01, 0.001: fd-central")
     shorter = solver("descent", replace(DESCENT, at_most=200), gradual=True)
-    monkeypatch.setattr("gradient_routes.routes.solvers.factorization.linear_solver", lambda name: shorter)
+    monkeypatch.setattr(
+        "gradient_routes.routes.solvers.factorization.linear_solver",
+        lambda name: shorter if name == shorter.name else linear_solver(name),
+    )
     unmet = study("bar", "adjoint", sweep=Sweep((1e-1, 1e-12)), linear_solver="descent").rows
     assert [row["status"] for row in unmet] == ["ok", "failed"]
     assert unmet[1]["reason"].startswith("bar: steepest descent: |b - A x| = ")
