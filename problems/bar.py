@@ -123,6 +123,7 @@ class Bar(Problem):
     def _update_notes(self) -> None:
         """Recomputes last_sensor and notes after the sensors or the stop have changed."""
         self.last_sensor = int(self.sensors.nodes.max(initial=0))
+        self.typical = min(3, self.last_sensor) - 1 if self.last_sensor else None  # loaded elements on both sides of it
         self.notes = self._notes()
 
     def _set_stop(self, stop: Stop | None) -> None:
@@ -137,6 +138,10 @@ class Bar(Problem):
         other._set_stop(stop)
         other.notes = other._notes()
         return other
+
+    def tip(self, u: Array) -> float:
+        """u_N [m]."""
+        return float(u[self.n - 1])
 
     def refined(self, p: Array) -> tuple[Bar, Array] | None:
         """Every element split in two, the same data at the same points; None if too many elements."""

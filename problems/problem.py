@@ -1,9 +1,9 @@
-"""READ FIRST. What a problem is, and the laws it obeys.
+"""READ FIRST. What a problem is, and the laws that it obeys.
 
     min_p  J(p) = 1/2 |S u(p) - d|^2 + alpha Phi(p)     subject to  R(u(p), p) = 0
 
 A problem is physics only: it evaluates R, J and their partial derivatives at a given (u, p).
-It never solves and never differentiates through a solve; that is what routes are for.
+It never solves and never differentiates through a solve: routes do.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered
 
 if TYPE_CHECKING:
+    from gradient_routes.problems.contact import Stop
     from gradient_routes.problems.data.observation import Candidates, Observation
     from gradient_routes.problems.data.regularization import Prior
 
@@ -28,9 +29,10 @@ Structure = Literal["spd", "symmetric", "general"]
 
 
 class Offers(enum.Flag):
-    """What a problem offers and a route needs. SOLVE contains VALUE, LINEARIZE contains SOLVE.
+    """What a problem offers, and a route or a study needs. SOLVE contains VALUE, LINEARIZE contains SOLVE.
 
     Every bit has a name, STATE and PARTIALS included: Python 3.11.2 drops bits that have none.
+    From OBSERVATION on: one bit a method, set where a class overrides that method of Problem.
     """
 
     VALUE = 1
@@ -40,8 +42,22 @@ class Offers(enum.Flag):
     LINEARIZE = SOLVE | PARTIALS
     TRACE = 8
     COMPLEX = 16
+    OBSERVATION = 32
+    ACTIVE_SET = 64
+    REFINED = 128
+    INTEGRAL = 256
+    CONTINUOUS_ADJOINT = 512
+    FIELDS = 1024
 
 
+OPTIONAL = (
+    Offers.OBSERVATION,
+    Offers.ACTIVE_SET,
+    Offers.REFINED,
+    Offers.INTEGRAL,
+    Offers.CONTINUOUS_ADJOINT,
+    Offers.FIELDS,
+)
 OFFERED_AS = {
     Offers.VALUE: "J(p) as a number",
     Offers.SOLVE: "R(u, p), R_u and J(u, p) as numbers",
@@ -58,7 +74,7 @@ def offer_names(offers: Offers) -> list[str]:
 
 
 class Operator(Protocol):
-    """Anything with `@` and `.T`: a NumPy array, a SciPy sparse matrix, a matrix known by its structure."""
+    """Anything with `@` and `.T`: a NumPy array, a SciPy sparse matrix, a matrix given by its structure."""
 
     @property
     def T(self) -> Any: ...
@@ -71,14 +87,14 @@ def default_label(i: int) -> str:
 
 @dataclass(frozen=True)
 class Parameters:
-    """The vector p of length n_p: where it starts, how large a natural change is, where it may live.
+    """The vector p of length n_p: its starting point, the size of its natural changes, its bounds.
 
     start        (n_p,) the documented starting point
     scale        (n_p,) > 0, a natural change of p_i: finite differences step by max(|p_i|, scale_i)
-    lower, upper the open interval p_i must lie in, one number for all or (n_p,)
+    lower, upper the ends of the open interval of p_i, one number for all or (n_p,)
     unit         of p_i for tables, one for all or one each
     label        name of component i (counted from 0)
-    position     (n_p, d), d <= 3, where p_i lives [m], where it lives somewhere
+    position     (n_p, d), d <= 3, of p_i [m]; None where it has none
     """
 
     start: Array
@@ -90,7 +106,7 @@ class Parameters:
     position: Array | None = None
 
     def __post_init__(self) -> None:
-        for name in ("start", "scale"):  # integers would truncate every step
+        for name in ("start", "scale"):  # an array of integers would truncate every step
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
         if self.start.ndim != 1 or self.scale.shape != self.start.shape or not (self.scale > 0).all():
             raise InputError(
@@ -106,7 +122,7 @@ class Parameters:
         return len(self.start)
 
     def natural(self, p: Array) -> Array:
-        """max(|p_i|, scale_i), (n_p,): the change of each component that a relative step of 1 stands for."""
+        """max(|p_i|, scale_i), (n_p,): the change of each component by a relative step of 1."""
         return np.asarray(np.maximum(np.abs(p), self.scale))
 
     def bounds(self, i: int) -> tuple[float, float]:
@@ -118,7 +134,7 @@ class Parameters:
         return self.unit if isinstance(self.unit, str) else self.unit[i]
 
     def check(self, p: Array, who: str) -> Array:
-        """Return p as float64 or raise DomainError / InputError naming the first component at fault."""
+        """p as float64. Raises DomainError or InputError that names the first wrong component."""
         p = np.asarray(p, dtype=np.float64)
         if p.shape != self.start.shape:
             raise InputError(f"{who}: p has {p.size} values, the problem has {len(self)} parameters - give {len(self)}")
@@ -148,7 +164,7 @@ class Traced:
     """The same physics as pure functions of jax.numpy arrays.
 
     residual(u, p) -> (n_u,), objective(u, p) -> scalar; both must equal the NumPy ones.
-    For stationary iterations on a linear problem, where the problem knows them:
+    For stationary iterations on a linear problem, optional:
     diagonal(p) -> (n_u,) of R_u, and spectral_bound(p), a differentiable upper bound of its largest eigenvalue.
     """
 
@@ -160,10 +176,10 @@ class Traced:
 
 @dataclass(frozen=True)
 class Reference:
-    """A gradient to judge others by, found by other means than any route.
+    """A gradient to compare others with, computed by other means than any route.
 
-    size is the norm of the terms whose cancellation gives the gradient: where |gradient| is below
-    rounding of it, errors are measured against size instead (a zero has no relative error).
+    size is the norm of the terms whose sum is the gradient: where |gradient| is below their rounding, errors are
+    relative to size instead (a zero has no relative error).
     """
 
     name: str
@@ -176,17 +192,21 @@ class Problem:
 
     name       as in selectors
     parameters what p is
-    offers     what the methods below provide; a route needing more is skipped with a reason
+    offers     what the methods below provide; a route needing more is skipped with a reason. OPTIONAL members are
+               added for the methods of their names that a class overrides
     n_state    n_u, the number of free unknowns (0 for a black box)
     linear     R is affine in u: one Newton step solves it
-    offset     |X| where R is a function of X + u, as positions are: rounding is then relative to that
+    offset     |X| where R is a function of positions X + u: its rounding is relative to X + u
     structure  of R_u: "spd", "symmetric" (indefinite) or "general"
-    load_steps a solve that fails may proceed by R(u, p) - (1 - t) R(u_0, p) = 0, t from 0 to 1: the load in steps
+    load_steps a solve that fails is repeated by steps of the load: R(u, p) - (1 - t) R(u_0, p) = 0, t from 0 to 1
     matrix_free  tangent_operator gives products with R_u without assembling it
     line_search  False where full Newton steps converge from anywhere, R being convex with R_u^{-1} >= 0 (Ortega &
-               Rheinboldt 1970, 13.3.4) or an active-set search ending: halving steps would only get in the way
+               Rheinboldt 1970, 13.3.4) or by an active-set method: halving steps would hinder it
     affine     u is an affine function of p: R is affine in u and p is a load
-    regularization  the prior whose weight is alpha, where there may be one
+    regularization  the prior, whose weight is alpha; None where there can be none
+    stop       of a state that meets an obstacle: the contact law, None where there is none
+    typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
+               no one in particular
     notes      sentences a user should read beside the result
     """
 
@@ -202,7 +222,16 @@ class Problem:
     line_search: bool = True
     affine: bool = False
     regularization: Prior | None = None
+    stop: Stop | None = None
+    typical: int | None = None
     notes: tuple[str, ...] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for offer in OPTIONAL:
+            method = str(offer.name).lower()
+            if getattr(cls, method) is not getattr(Problem, method):
+                cls.offers |= offer
 
     def value(self, p: Array) -> float:
         """J(p), for a black box that offers VALUE only."""
@@ -254,15 +283,15 @@ class Problem:
         return other
 
     def candidates(self) -> Candidates | None:
-        """What a sensor could read; None: any unknown of the state."""
+        """What sensors can read; None: any unknown of the state."""
         return None
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array] | None:
-        """What regularizes: the prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where nothing can."""
+        """The prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where there can be no prior."""
         return None
 
     def reference(self, p: Array) -> Reference | None:
-        """A gradient known by other means (closed form), or None."""
+        """A gradient by other means (a closed form), or None."""
         return None
 
     def truth(self) -> Array | None:
@@ -270,44 +299,52 @@ class Problem:
         return None
 
     def twin(self) -> Problem | None:
-        """The problem whose state at truth() makes this one's synthetic data; None where the data are known."""
+        """The problem whose state at truth() gives the synthetic data of this one; None where the data are known."""
         return None
 
     def observed(self, u: Array, seed: int | None = None) -> Problem:
-        """This problem with the data its sensors read of the state u (n_u,), and noise on them if it was asked for: the
-        draw of `seed`, None: of its own.
+        """This problem with the readings of its sensors at the state u (n_u,) as data, and noise if it has any: drawn
+        from `seed`, or from the problem's own seed where that is None.
         """
         raise NotOffered(f"{self.name}: has no synthetic data")
 
     def load_cases(self) -> list[Problem]:
-        """This problem with the data of one load case each, whose misfits add up to its own; none where it has one."""
+        """One problem for the data of each load case, whose misfits add up to this one's; [] where it has only one."""
         return []
 
     def active_set(self, u: Array, p: Array) -> Hashable | None:
-        """Which smooth branch of a piecewise smooth R holds at (u, p), a word or a tuple; None where R is smooth."""
+        """The active smooth branch of a piecewise smooth R at (u, p), a word or a tuple; None where R is smooth."""
         return None
 
+    def tip(self, u: Array) -> float | None:
+        """The displacement [m] that `stop` limits; None where there is nothing to limit."""
+        return None
+
+    def with_stop(self, stop: Stop) -> Problem:
+        """This problem, its data and its mesh, with another stop."""
+        raise NotOffered(f"{self.name}: has no stop to exchange")
+
     def refined(self, p: Array) -> tuple[Problem, Array] | None:
-        """The same problem on a mesh of half the size, and p there; None where it has no such mesh."""
+        """The same problem on a mesh of half the mesh size, and p on it; None where there is no such mesh."""
         return None
 
     def integral(self, u: Array, p: Array) -> tuple[float, Array] | None:
-        """Another functional and its derivative by u (n_u,): the integral that J, a sum over nodes, stands for."""
+        """The integral that J, a sum over nodes, approximates, and its derivative by u (n_u,)."""
         return None
 
     def continuous_adjoint(self, u: Array, p: Array) -> tuple[Any, Operator] | None:
-        """The adjoint equation derived first and discretized then: A and Q, A lam = -J_u, dJ/dp = J_p + Q^T lam.
+        """The adjoint equation differentiated first and discretized then: A and Q, A lam = -J_u, dJ/dp = J_p + Q^T lam.
 
         They equal R_u^T and R_p only as the mesh size h goes to 0, and so does the gradient.
         """
         return None
 
     def condition(self, p: Array) -> float | None:
-        """Estimate of the condition number of R_u, used only to predict iteration counts before paying for them."""
+        """An estimate of the condition number of R_u, used only to predict numbers of iterations."""
         return None
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
-        """What a person wants beside the gradient, parameter by parameter."""
+        """What is worth showing beside the gradient, parameter by parameter."""
         return ParameterView()
 
     def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields | None:
@@ -317,10 +354,10 @@ class Problem:
 
 @dataclass(frozen=True)
 class Fields:
-    """What lives on a mesh, for a viewer.
+    """Fields on a mesh, for a viewer.
 
     points     (n, 3) [m]
-    cell_type  meshio's name of the one kind of cell, "hexahedron" say
+    cell_type  the name of the one kind of cell in meshio, such as "hexahedron"
     cells      (n_e, k), points of every cell, in meshio's (VTK's) order
     point_data by name, (n,) or (n, 3)
     cell_data  by name, (n_e,) or (n_e, 3)
@@ -335,7 +372,7 @@ class Fields:
 
 @dataclass(frozen=True)
 class ParameterView:
-    """Columns (n_p,) to show beside a gradient, and which parameters no datum can see, marked as such."""
+    """Columns (n_p,) to show beside a gradient, and a `mark` for parameters that no datum depends on, the `blind`."""
 
     columns: Mapping[str, Array] = field(default_factory=dict)
     blind: Array | None = None

@@ -1,4 +1,4 @@
-"""The complex step: a derivative without a subtraction, hence without a step dilemma (Squire & Trapp 1998)."""
+"""The complex step: a derivative without a subtraction, so that the step can be tiny (Squire & Trapp 1998)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, rout
 
 RELATIVE_STEP = 1e-30  # its square is far below eps, itself far above the smallest float
 
-POLISH = 1  # the imaginary part, a derivative, converges one Newton step behind the real part that is watched
+POLISH = 1  # the imaginary part, a derivative, converges one Newton step after the real part, which is tested
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:

@@ -1,4 +1,4 @@
-"""A forward solve as a function JAX differentiates: for the route implicit-ad, and for anyone's own jax.grad."""
+"""A forward solve as a function that JAX differentiates: for the route implicit-ad, and for jax.grad in user code."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from gradient_routes.routes.newton import State
 
 
 class Solved:
-    """A solved state on JAX's tape: its arrays u, p are leaves, its factors travel along as a constant."""
+    """A solved state on JAX's tape: its arrays u, p are leaves, its factors are a constant."""
 
     def __init__(self, state: State) -> None:
         self.state = state
 
 
 jax.tree_util.register_pytree_node(
-    # rebuilding it needs no leaves: they are there to be counted as bytes of the tape
+    # the leaves are declared so that they count as bytes of the tape; the object itself is passed on
     Solved,
     lambda solved: ((solved.state.u, solved.state.p), solved),
     lambda solved, leaves: solved,
@@ -34,7 +34,7 @@ def differentiable_solve(
     """p -> u(p) with R(u, p) = 0, to be differentiated by jax.grad or jax.vjp, eagerly (not under jit).
 
     The implicit function theorem is its pullback: u_bar -> R_p^T lam with R_u^T lam = -u_bar, one transposed
-    solve with `factors` as LinearizedSolver takes them. `on_solved` is told each state that a gradient will reuse.
+    solve with `factors` as LinearizedSolver takes them. `on_solved` is called with each state that a pullback holds.
     """
     residual = model.traced.residual
     R_p_transposed = jax.jit(lambda u, p, lam: jax.vjp(lambda p: residual(u, p), p)[1](lam)[0])
@@ -58,6 +58,6 @@ def differentiable_solve(
 
 
 def held_bytes(pullback: Any) -> int:
-    """Bytes of the arrays a jax.vjp pullback holds until it is called: the tape."""
+    """Bytes of the arrays that a pullback of jax.vjp holds until it is called: the tape."""
     arrays = {id(leaf): leaf.nbytes for leaf in jax.tree.leaves(pullback)}
     return sum(arrays.values())

@@ -1,4 +1,4 @@
-"""The adjoint method with one mistake in it, to see who notices: mistakes that people have made, and published."""
+"""The adjoint method with one deliberate mistake, to test verification: mistakes found in published codes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from gradient_routes.routes.route import Offers, Result, Work, route
 
 Fault = Annotated[
     Literal["sign", "factor", "transpose", "missing-term", "stale", "loose", "functional", "otd", "scale"],
-    "sign of lam dropped; dR/dp of one component doubled; R_u for R_u^T; J_p dropped; factors of the Newton step"
-    " before; forward solve at 1e8 times the tolerance; gradient of the integral that J is a sum for; adjoint"
-    " equation discretized on its own; chain rule of p = log(...) forgotten",
+    "wrong sign of lam; dR/dp of one component doubled; R_u in place of R_u^T; J_p omitted; factors of the previous"
+    " Newton step; forward solve at 1e8 times the tolerance; gradient of the integral that J approximates; adjoint"
+    " equation differentiated before it is discretized; chain rule of p = log(...) omitted",
 ]
 Component = Annotated[int | None, "of fault=factor, counted from 1 [the most sensitive]"]
 LOOSE = 1e8  # times the forward tolerance: 1e-4 by default
@@ -29,30 +29,32 @@ def cost(n_p: int, forward: ForwardWork, *, fault: str, component: int | None) -
     if fault == "otd":
         return forward.cold + Work(factorizations=1, solves=1)
     if fault == "loose" and forward.counted is not None:
-        return forward.counted  # how many steps a looser tolerance saves is known when they are counted
+        return forward.counted  # how many steps the looser tolerance saves is known once they are counted
     return work(forward, 1, transposed=fault != "transpose", factors="stale" if fault == "stale" else "refined")
 
 
 def check(*, fault: str, component: int | None) -> None:
     if component is not None and (component < 1 or fault != "factor"):
-        raise InputError(f"faulty-adjoint: component={component} - fault=factor takes one from 1, other faults none")
+        raise InputError(
+            f"faulty-adjoint: component={component} - fault=factor takes one from 1, other faults take none"
+        )
 
 
 def missing(problem: Problem, *, fault: str, component: int | None) -> str | None:
     lacks = {
-        "functional": (type(problem).integral is Problem.integral, "a J that stands for an integral"),
-        "otd": (type(problem).continuous_adjoint is Problem.continuous_adjoint, "an adjoint equation of its own"),
+        "functional": (Offers.INTEGRAL not in problem.offers, "a J that stands for an integral"),
+        "otd": (Offers.CONTINUOUS_ADJOINT not in problem.offers, "an adjoint equation of its own"),
         "scale": (not problem.parameters.unit_of(0).startswith("log"), "parameters that are logarithms"),
     }
     lacking, what = lacks.get(fault, (False, ""))
     if component is not None and component > len(problem.parameters):
         return f"faulty-adjoint[component={component}]: {problem.name} has {len(problem.parameters)} parameters"
-    return f"faulty-adjoint[fault={fault}] needs {what}, which {problem.name} has not" if lacking else None
+    return f"faulty-adjoint[fault={fault}] needs {what}, which {problem.name} does not have" if lacking else None
 
 
 @route("faulty-adjoint", needs=Offers.LINEARIZE, cost=cost, check=check, missing=missing, sound=False)
 def faulty_adjoint(model: Model, p: Array, *, fault: Fault = "sign", component: Component = None) -> Result:
-    """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p, with a mistake on purpose."""
+    """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p, with a deliberate mistake."""
     if fault == "loose":
         model = Model(model.problem, replace(model.solver, rtol=min(0.5, LOOSE * model.solver.rtol)), model.tally)
     state = model.solve(p)
@@ -88,5 +90,7 @@ def _adjoint_state(model: Model, state: State, lin: Linearization, fault: str) -
 
 def _known(offered: Any) -> Any:
     if offered is None:
-        raise NotOffered("faulty-adjoint: the problem offers no such thing with these options - choose another fault")
+        raise NotOffered(
+            "faulty-adjoint: the problem lacks what this fault needs with these options - choose another fault"
+        )
     return offered

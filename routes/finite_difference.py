@@ -1,4 +1,4 @@
-"""Finite differences of J: nothing but J is needed, and the step is a dilemma (truncation against round-off)."""
+"""Finite differences of J. They need J only; the step balances truncation against rounding."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gradient_routes.routes.route import ForwardWork, Result, Work, route
 
 Start = Annotated[
     Literal["cold", "warm", "chord"],
-    "perturbed solves from scratch; from the base state; from it and on its factors",
+    "perturbed solves from the initial state; from the base state; from it with its factors",
 ]
 StepOption = Annotated[float | None, "h_i / max(|p_i|, s_i) [sqrt(eps) one-sided, cbrt(eps) central]"]
 EPS = float(np.finfo(np.float64).eps)
-ONE_SIDED, CENTRAL = EPS ** (1 / 2), EPS ** (1 / 3)  # truncation and round-off balance there
-SCATTER = 1e3  # what second derivatives and rounding in J add to the balance of a well-scaled problem
+ONE_SIDED, CENTRAL = EPS ** (1 / 2), EPS ** (1 / 3)  # truncation and rounding are equal there
+SCATTER = 1e3  # by which second derivatives and rounding of J exceed that balance on a well-scaled problem
 
 
 def check(*, step: float | None, start: str) -> None:
@@ -52,6 +52,7 @@ def near(forward: ForwardWork, start: str) -> Callable[[int, float], Work]:
     check=check,
     missing=missing,
     accuracy=SCATTER * ONE_SIDED,
+    step=ONE_SIDED,
 )
 def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p)) / h_i,  h_i = sqrt(eps) max(|p_i|, s_i)."""
@@ -69,6 +70,7 @@ def fd_one_sided(model: Model, p: Array, *, step: StepOption = None, start: Star
     check=check,
     missing=missing,
     accuracy=SCATTER * CENTRAL**2,
+    step=CENTRAL,
 )
 def fd_central(model: Model, p: Array, *, step: StepOption = None, start: Start = "cold") -> Result:
     """(J(p + h_i e_i) - J(p - h_i e_i)) / 2 h_i,  h_i = cbrt(eps) max(|p_i|, s_i)."""
@@ -112,9 +114,9 @@ def shifted(p: Array, i: int, h: float) -> Array:
 
 
 def objective_near(model: Model, p: Array, start: str) -> tuple[Callable[[Array], float], float | None]:
-    """J as a function for points near p, and J(p) where finding that function took a solve at p."""
+    """J as a function of points near p, and J(p) where making that function took a solve at p."""
     if start == "cold":
         return model.value, None
-    base = model.solve(p, polish=1)  # else what is left of its residual, 1e-12, is divided by h = 1e-8
+    base = model.solve(p, polish=1)  # else the remaining residual, 1e-12, would be divided by h = 1e-8
     factors = base.factors if start == "chord" else None
     return lambda q: float(model.solve(q, base, factors).J), float(base.J)

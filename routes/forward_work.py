@@ -1,4 +1,4 @@
-"""What declared bills are made of: the work of one forward solve, and estimates for solves near it."""
+"""Declared work is composed of this: the work of one forward solve, and estimates for solves near it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gradient_routes.routes.tally import Work
 
 @dataclass(frozen=True)
 class ForwardWork:
-    """The work of one cold forward solve, and of others: estimates, exact once steps and products are counted.
+    """The work of one cold forward solve, and estimates for others, exact once steps and products are counted.
 
-    cold         counted for one solve at the p in question; a black box counts just that one
+    cold         counted for one solve at p; of a black box, the one solve
     linear       R is affine in u
     rtol         of the solver
-    counted      of a whole gradient: how many Newton steps and refinements p needed is taken from it, once known
+    counted      of a whole gradient, once known: the numbers of Newton steps and refinements are taken from it
     matrix_free  products with R_u need no assembly
-    inexact      Newton steps are, see Solver.newton: k of them with m products take k + m substitutions
+    inexact      Newton steps, see Solver.newton: k of them with m products take k + m substitutions
     """
 
     cold: Work
@@ -33,7 +33,7 @@ class ForwardWork:
         return self.cold if self.linear else self.cold + self._newton(1)
 
     def full(self, times: int, polish: int) -> Work:
-        """`times` cold solves near p by full steps: what a complex p takes, whatever the solver's are."""
+        """`times` cold solves near p by full steps, which complex p takes whatever the solver says."""
         if not self.inexact:
             return self.solves(times, polish)
         steps = times * (self.cold.newton_iterations + polish)
@@ -54,7 +54,7 @@ class ForwardWork:
         return Work() if self.linear else Work(assemblies=1, factorizations=1)
 
     def sweeps(self, solves: int) -> int:
-        """Products of `solves` linearized solves together: one each, unless they are known."""
+        """Products of `solves` linearized solves together: estimated as one each until they are counted."""
         return solves if self.counted is None else self.counted.matvecs - self.cold.matvecs
 
     def renewals(self) -> int:
@@ -62,7 +62,7 @@ class ForwardWork:
         return 0 if self.counted is None else self.counted.factorizations - self.cold.factorizations
 
     def warm(self, times: int, h: float) -> Work:
-        """A polished solve and `times` from its state, |R| ~ h away: a step squares that (linear: one is enough)."""
+        """A polished solve and `times` from its state, where |R| ~ h: a step squares that (linear: one is enough)."""
         if self.inexact and (iterated := self._iterated(1 + times, cold=1)):
             return iterated
         each = 1 if self.linear else max(1, math.ceil(math.log2(self._decades(h))))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Literal
 
 import numpy as np
 
 from gradient_routes.problems.errors import NotConverged
-from gradient_routes.problems.problem import Array
+from gradient_routes.problems.problem import Array, Operator
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State, norm
 from gradient_routes.routes.route import ForwardWork, Work
@@ -20,17 +20,17 @@ Factors = Annotated[
     Literal["refined", "fresh", "stale"],
     "the last Newton factors corrected with R_u at u; new ones at u; the last ones as they are",
 ]
-SAFETY = 10.0  # on the contraction seen, before it is trusted once more
-WORTH = 15  # products, each with a substitution, that cost what an assembly and a factorization cost
+SAFETY = 10.0  # of the tolerance: the last correction relies on the mean contraction of those before it
+WORTH = 15  # products, each with a substitution, that cost as much as an assembly and a factorization
 
 
 class LinearizedSolver:
     """R_u^{-1} and R_u^{-T} at a solved state, for about `solves` right-hand sides.
 
-    The last Newton factors belong to the iterate before: used as they are (`stale`), the gradient is off by the
-    size of the last step. `refined` corrects with them by Krylov iterations on products with R_u; where those would
-    take longer than new factors, as after inexact steps, and for `fresh`, R_u is factorized at u. A linear problem's
-    factors fit. Solves that iterate end at the solver's adjoint_rtol; a solver that factorizes nothing takes R_u at u.
+    The last Newton factors are those of R_u at the iterate before: used as they are (`stale`), they give a gradient
+    with an error of the size of the last step. `refined` uses them as preconditioner of Krylov iterations with R_u at
+    u. R_u is factorized at u for `fresh`, where these iterations would take longer, as after inexact steps, and by
+    solvers without factors. R_u of a linear problem does not depend on u. Iterations end at the solver's adjoint_rtol.
     """
 
     def __init__(self, model: Model, state: State, factors: str, solves: int = 1) -> None:
@@ -79,6 +79,15 @@ class LinearizedSolver:
         free = self.model.problem.matrix_free
         self.A = self.model.factors_at(self.state) if free else self.model.factorize(self.R_u)
         self.R_u = None
+
+
+def state_derivatives(R_u: LinearizedSolver, R_p: Operator, components: Iterable[int]) -> Iterator[Array]:
+    """du/dp_i (n_u,), R_u du/dp_i = -R_p e_i, for each of the components i, counted from 0: one solve each."""
+    e = np.zeros(len(R_u.state.p))
+    for i in components:
+        e[i] = 1.0
+        yield R_u.solve(-(R_p @ e))
+        e[i] = 0.0
 
 
 def work(forward: ForwardWork, solves: int, transposed: bool, factors: str) -> Work:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.problem import Array
 
-SMALLEST = 1.0 / 256.0  # increment of the load; what fails with it fails
+SMALLEST = 1.0 / 256.0  # increment of the load that is tried
 
 
 def by_load_steps(solve: Callable[[float, Array], Array], u: Array, who: str) -> Array:

@@ -1,4 +1,4 @@
-"""Model = problem + solver + tally: all a route sees. Work passes its few doorways, and only they count."""
+"""Model = problem + solver + tally: what a route works with. Its methods do the expensive operations and count them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from gradient_routes.problems.errors import NotConverged, SingularMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
 from gradient_routes.routes.load_stepping import by_load_steps
-from gradient_routes.routes.newton import Solver, State, Step, newton, norm
-from gradient_routes.routes.newton_steps import Chord, Direction, Doorways, Full, Inexact
+from gradient_routes.routes.newton import Solver, State, System, newton, norm
+from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact, Operations
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.tally import Tally
@@ -32,7 +32,7 @@ class Model:
 
     @cached_property
     def traced(self) -> Traced:
-        """R and J in jax.numpy: one object, so that JAX recognizes what it has compiled."""
+        """R and J in jax.numpy: one object, so that JAX reuses what it has compiled."""
         return self.problem.traced()
 
     def residual(self, u: Array, p: Array) -> Array:
@@ -64,10 +64,24 @@ class Model:
     def factors_at(self, state: State) -> Factorization:
         """Factors of R_u at the solved state itself.
 
-        The last Newton factors belong to the iterate before: a linearized solve with them is off by the size of
-        the last step (1e-8 and worse). Only a linear problem's fit.
+        The last Newton factors are those of R_u at the iterate before: a linearized solve with them has an error of
+        the size of the last step (1e-8 and more). R_u of a linear problem does not depend on u.
         """
         return state.factors if self.problem.linear else self.factorize(self.tangent(state.u, state.p))
+
+    def negative_eigenvalues(self, state: State) -> int | None:
+        """How many eigenvalues of a symmetric R_u are negative at a solved state, 0 where it is stable; None: unknown.
+
+        From the factors of the last Newton step, which is small; after inexact steps, which keep factors of an earlier
+        iterate, from new ones.
+        """
+        factors = state.factors if state.rate is None else self.factors_at(state)
+        return factors.negative_eigenvalues
+
+    def noise(self, state: State) -> float:
+        """|dJ| by one more full Newton step from a solved state: about the error that the tolerance leaves in J."""
+        du = self.solve_linear(self.factors_at(state), self.residual(state.u, state.p))
+        return float(abs(self.problem.objective(state.u - du, state.p) - state.J))
 
     def tangent_operator(self, state: State) -> Any:
         """R_u at a solved state for products only: matrix-free where the problem can, else assembled."""
@@ -80,7 +94,7 @@ class Model:
         return self.solve_linear(factors, R)
 
     def linearize(self, state: State) -> Linearization:
-        """R_p, J_u, J_p at a solved state: about a residual's worth, and of no kind that is counted."""
+        """R_p, J_u, J_p at a solved state. Not counted: they cost about as much as a residual."""
         return self.problem.linearize(state.u, state.p)
 
     def solve(
@@ -88,7 +102,7 @@ class Model:
     ) -> State:
         """Solve R(u, p) = 0: cold, warm from the state `start`, by chord steps if `factors` are given.
 
-        A cold solve that fails is tried again by load steps where the problem knows its load. `polish` Newton steps
+        A cold solve that fails is repeated by load steps where the problem has `load_steps`. `polish` Newton steps
         are taken after convergence, on nonlinear problems. p may be complex where the problem offers COMPLEX.
         Raises NotConverged, SingularMatrix.
         """
@@ -119,7 +133,7 @@ class Model:
 
     def _direction(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> Direction:
         problem = self.problem
-        doorways = Doorways(
+        operations = Operations(
             assemble=lambda u: self.tangent(u, p),
             factorize=self.factorize,
             operator=(lambda u: problem.tangent_operator(u, p)) if problem.matrix_free else None,
@@ -129,10 +143,10 @@ class Model:
             symmetric=problem.structure != "general",
         )
         if factors is not None:
-            return Chord(doorways, factors)
+            return Chord(operations, factors)
         if self.inexact and not np.iscomplexobj(p):
-            return Inexact(doorways, None if start is None else start.factors)
-        return Full(doorways)
+            return Inexact(operations, None if start is None else start.factors)
+        return Full(operations)
 
     @property
     def _who(self) -> str:
@@ -149,22 +163,22 @@ class Model:
     ) -> tuple[Array, tuple[float, ...], float]:
         """Newton's method on R + unloading, from u."""
         problem = self.problem
-        step = Step(
+        system = System(
             problem.offset,
             lambda u: self.residual(u, p) + unloading,
             direction,
             problem.line_search,
             lambda u: problem.active_set(u, p),
         )
-        return newton(step, u, self.solver, self._who, scale, polish)
+        return newton(system, u, self.solver, self._who, scale, polish)
 
     def relative_residual(self, u: Array, p: Array) -> float:
-        """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that was not solved for here: two residuals."""
+        """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that another solver found: two residuals."""
         scale = norm(self.residual(self.problem.initial(p), p))
         return norm(self.residual(u, p)) / (scale or 1.0)
 
     def value(self, p: Array) -> float:
-        """J(p), one forward solve; the way into a black box, too."""
+        """J(p) by one forward solve, or by the `value` of a black box."""
         if Offers.SOLVE in self.problem.offers:
             return float(self.solve(p).J)
         self.tally.count("forward_solves")

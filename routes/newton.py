@@ -19,8 +19,8 @@ from gradient_routes.routes.tally import Work
 STEP_LENGTHS = tuple(0.5**i for i in range(9))
 DESCENT = 1e-4  # of |R|, times the step length, for a step to be taken
 ROUNDING = 16.0 * np.finfo(np.float64).eps  # |R| <= ROUNDING |R_u| (|u| + |X|): no iteration can do better
-CANCELLED = 1e4  # |u| / |u - du| beyond which u - du has lost digits that |R| need not show
-LAST = 8  # iterates that a report shows
+CANCELLED = 1e4  # |u| / |u - du| beyond which u - du has lost digits, which |R| may not show
+LAST = 8  # iterates in a message
 
 Newton = Literal["full", "inexact"]
 
@@ -30,9 +30,9 @@ class Solver:
     """When a forward solve is done: |R|_inf <= rtol |R(u_0)|_inf, or R is rounding; at most max_steps steps.
 
     linear_solver  the name of a registered LinearSolver; auto: the best direct one that is installed
-    newton         full: R_u is factorized at every step; inexact: once, and again where that pays. A linear problem
-                   takes one full step, complex p full ones: the imaginary part is not watched; and so do problems
-                   without line search: that full steps converge is known of exact ones
+    newton         full: R_u is factorized at every step; inexact: once, and again where that is cheaper than
+                   iterating. Full steps are taken on linear problems, for complex p, whose imaginary part no tolerance
+                   controls, and on problems without line search, where convergence is proved for full steps
     adjoint_rtol   |b - R_u x|_inf / |b|_inf of linearized solves, transposed or not, where they iterate
     polish         Newton steps after convergence, on nonlinear problems
     """
@@ -54,10 +54,11 @@ class Solver:
 class State:
     """A solved state: u (n_u,) and J at p (n_p,).
 
-    factors belong to the last step (for a linear problem: to R_u itself), or to an earlier one after inexact steps:
-    rate is then the contraction a product that iterations with them saw, or that the steps before let expect, else
-    None. history holds |R|_inf of every iterate, scale is the |R|_inf that tolerances are relative to, work what the
-    solve took.
+    factors  of R_u at the last step, for a linear problem R_u itself; after inexact steps, of an earlier step
+    rate     after inexact steps, the contraction by a product preconditioned with these factors, measured or expected
+    history  |R|_inf of every iterate
+    scale    the |R|_inf that tolerances are relative to
+    work     counted in the solve
     """
 
     p: Array
@@ -76,8 +77,8 @@ class State:
 
 
 @dataclass(frozen=True)
-class Step:
-    """What Newton's method needs of a problem, bound to one p."""
+class System:
+    """R(u) = 0 for Newton's method: a problem bound to one p, and how its steps are found."""
 
     offset: float
     residual: Callable[[Array], Array]
@@ -87,41 +88,42 @@ class Step:
 
 
 def newton(
-    step: Step,
+    system: System,
     u: Array,
     solver: Solver,
     who: str,
     scale: float | None = None,
     polish: int = 0,
 ) -> tuple[Array, tuple[float, ...], float]:
-    """u <- u - a du until |R| is small, du being R_u^{-1} R or what the step's direction takes for it.
+    """u <- u - a du until |R| is small, du being R_u^{-1} R or an approximation of it: see newton_steps.
 
-    The step length a is halved until |R| falls; an inverted element or an overflow gives no finite |R| and is
-    stepped back from in the same way, once the direction is as exact as it can be. At least one step is taken, so that
-    a warm start is never returned untouched and the factors are those of the neighbourhood; after convergence,
-    `polish` more. Without line search a is 1 and |R| may rise. Where R is smooth in pieces, a small |R| counts only on
-    the piece that the step was made for, as |R_u| of a stiff penalty makes everything rounding; or where |R| was small
-    before, too, as at a kink. An iterate in which much cancelled is followed by another: |R| of a soft structure does
-    not feel what was lost. Returns u, the history of |R|_inf and the scale. Raises NotConverged with the history.
+    The step length a is halved until |R| falls, also where an inverted element or an overflow gives no finite |R|; if
+    no a is small enough, the direction is made exact first. Without line search a = 1 and |R| may rise. At least one
+    step is taken, so that a warm start is improved and factors near the solution exist; after convergence, `polish`
+    more. Convergence is not accepted
+    - where the step has changed the active set of a piecewise smooth R, because |R_u| of a stiff penalty makes any |R|
+      rounding, unless |R| was below the tolerance before the step, too, as at a kink;
+    - where digits cancelled in u - a du, because |R| of a soft structure does not show the loss.
+    Returns u, the history of |R|_inf and the scale. Raises NotConverged with the history.
     """
-    R = step.residual(u)
-    history, sets = [norm(R)], [step.active_set(u)]
+    R = system.residual(u)
+    history, sets = [norm(R)], [system.active_set(u)]
     scale = history[0] if scale is None else scale
     goal = solver.rtol * scale
     while len(history) <= solver.max_steps and math.isfinite(history[-1]):
-        du, norm_of_R_u = step.direction(u, R, scale, goal)
-        for a in STEP_LENGTHS if step.line_search else (1.0,):
+        du, norm_of_R_u = system.direction(u, R, scale, goal)
+        for a in STEP_LENGTHS if system.line_search else (1.0,):
             u_next = u - a * du
-            R_next, set_next = step.residual(u_next), step.active_set(u_next)
-            rounding = ROUNDING * norm_of_R_u * (norm(u_next) + step.offset)
+            R_next, set_next = system.residual(u_next), system.active_set(u_next)
+            rounding = ROUNDING * norm_of_R_u * (norm(u_next) + system.offset)
             small = norm(R_next) <= max(solver.rtol * scale, rounding) and set_next == sets[-1]
             small |= max(norm(R_next), history[-1]) <= solver.rtol * scale
-            small &= norm(u) <= CANCELLED * (norm(u_next) + step.offset)
+            small &= norm(u) <= CANCELLED * (norm(u_next) + system.offset)
             lower = norm(R_next) <= (1.0 - DESCENT * a) * history[-1]
-            if small or lower or (not step.line_search and math.isfinite(norm(R_next))):
+            if small or lower or (not system.line_search and math.isfinite(norm(R_next))):
                 break
         else:
-            if step.direction.renew():
+            if system.direction.renew():
                 continue
             raise _failure(who, history, sets, "no step along Newton's direction lowers |R|")
         u, R = u_next, R_next

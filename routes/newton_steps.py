@@ -1,7 +1,7 @@
-"""Where a Newton step goes: along R_u^{-1} R, along A^{-1} R with factors that are given, or near enough to the first.
+"""Newton steps: exact, R_u du = R; chord steps, A du = R with given factors of A; inexact, by Krylov iterations.
 
-Inexact steps keep one factorization and iterate with it (Dembo, Eisenstat & Steihaug 1982). What that costs, on the
-block with 16^3 cells in units of one product and one substitution (10 ms): a factorization with its assembly 16.
+Inexact steps keep one factorization as preconditioner (Dembo, Eisenstat & Steihaug 1982). On the block with 16^3 cells
+a factorization with its assembly costs as much as 16 products, each with a substitution (10 ms together).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.krylov import conjugate_gradients, conjugate_residuals, products_to
 from gradient_routes.routes.solvers.solver import Factorization
 
-WORTH = 20.0  # products that cost what new factors cost, and the few that those need in their turn
+WORTH = 20.0  # products that cost as much as new factors and the few products that follow them
 LOOSEST = 0.05  # forcing term |R - R_u du| / |R|
-BELOW = 0.3  # of the goal, where the last step aims
+BELOW = 0.3  # of the goal: the aim of the last step
 
 
 @dataclass(frozen=True)
-class Doorways:
-    """The counted operations that directions are made of, bound to one p."""
+class Operations:
+    """The counted operations that a step consists of, bound to one p."""
 
     assemble: Callable[[Array], Any]
     factorize: Callable[[Any], Factorization]
@@ -35,20 +35,20 @@ class Doorways:
     symmetric: bool
 
 
-Directed = tuple[Array, float]
+Correction = tuple[Array, float]
 
 
 class Direction(Protocol):
-    """factors are those of the last direction, rate their contraction of |R - R_u du| a product where it was iterated.
+    """factors are those of the last direction, rate the contraction of |R - R_u du| by a product where it iterated.
 
-    They are let go of before new ones are made, which can then take over their analysis: hold no other reference.
+    The factors are released before new ones are made, which can then reuse their analysis: keep no other reference.
     """
 
     factors: Factorization | None
     rate: float | None
 
-    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Directed:
-        """du (n_u,) at u, where |R| shall come down to `goal` in the end, and |A|_inf of the factors used."""
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
+        """du (n_u,) at u and |A|_inf of the factors used; the steps end where |R| <= goal."""
         ...
 
     def renew(self) -> bool:
@@ -57,15 +57,15 @@ class Direction(Protocol):
 
 
 class Full:
-    """R_u du = R, R_u factorized at every u."""
+    """R_u du = R with R_u factorized at every u."""
 
     rate: float | None = None
 
-    def __init__(self, doorways: Doorways) -> None:
-        self._do = doorways
+    def __init__(self, operations: Operations) -> None:
+        self._do = operations
         self.factors: Factorization | None = None
 
-    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Directed:
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
         self.factors = None
         self.factors = self._do.factorize(self._do.assemble(u))
         self._do.step()
@@ -76,15 +76,15 @@ class Full:
 
 
 class Chord:
-    """A du = R with the factors given."""
+    """A du = R with given factors of A."""
 
     rate: float | None = None
 
-    def __init__(self, doorways: Doorways, factors: Factorization) -> None:
-        self._do = doorways
+    def __init__(self, operations: Operations, factors: Factorization) -> None:
+        self._do = operations
         self.factors: Factorization | None = factors
 
-    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Directed:
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
         assert self.factors is not None
         self._do.step()
         return self._do.substitute(self.factors, R), self.factors.norm
@@ -96,24 +96,24 @@ class Chord:
 class Inexact:
     """|R - R_u du| <= eta |R| by Krylov iterations preconditioned with the factors of an earlier u.
 
-    eta = sqrt(|R| / scale), at most 0.05 and never below what the goal asks for: fewer products in all than with the
-    quadratic choices of Eisenstat & Walker 1996, for a residual costs less than the product it saves. New factors,
-    and an exact step, where more than WORTH products are to be expected before the goal.
+    eta = sqrt(|R| / scale), at most 0.05 and at least what the goal needs: fewer products in all than with the
+    quadratic choices of Eisenstat & Walker 1996, because a residual costs less than the product that it saves. New
+    factors and an exact step are made where more than WORTH products are to be expected.
     """
 
-    def __init__(self, doorways: Doorways, factors: Factorization | None = None) -> None:
-        self._do = doorways
+    def __init__(self, operations: Operations, factors: Factorization | None = None) -> None:
+        self._do = operations
         self.factors = factors
         self.rate: float | None = math.inf if factors is not None else None
         self._before = math.inf
 
-    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Directed:
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
         self._do.step()
         size, before = float(np.abs(R).max(initial=0.0)), self._before
         self._before = size
         if self.factors is None:
             return self._exact(self._do.assemble(u), R)
-        if self.rate is None:  # the step before was exact: what is left of R says how far R_u has moved since
+        if self.rate is None:  # after an exact step, the ratio of residuals estimates the contraction by its factors
             self.rate = size / before
         if self.rate < 1.0 and products_to(self.rate, size, goal) > WORTH:
             return self._exact(self._do.assemble(u), R)
@@ -137,7 +137,7 @@ class Inexact:
         assert self.factors is not None
         return self._do.substitute(self.factors, b)
 
-    def _exact(self, K: Any, R: Array) -> Directed:
+    def _exact(self, K: Any, R: Array) -> Correction:
         self.factors, self.rate = None, None
         self.factors = self._do.factorize(K)
         return self._do.substitute(self.factors, R), self.factors.norm

@@ -1,4 +1,4 @@
-"""READ SECOND. What a route is: a way from p to (J, dJ/dp), what it needs, and what it says it will cost."""
+"""READ SECOND. What a route is: a method that computes (J, dJ/dp) at p, what it needs of a problem, and its cost."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gradient_routes.routes.tally import Work
 
 
 class Result(NamedTuple):
-    """What a route returns; a plain tuple (J, gradient) will do.
+    """What a route returns; a plain tuple (J, gradient) is enough.
 
     J         objective at p, None where the route never evaluates it there
     gradient  dJ/dp (n_p,)
@@ -24,6 +24,7 @@ class Result(NamedTuple):
     residual  |R(u, p)|_inf achieved there, relative to |R(u_0, p)|_inf
     lam       adjoint state (n_u,), R_u^T lam = -J_u, where the route has one
     tape      bytes held between the forward and the backward sweep of AD
+    du_dp     (n_u, k), columns of du/dp that were asked for
     """
 
     J: float | None
@@ -32,6 +33,7 @@ class Result(NamedTuple):
     residual: float | None = None
     lam: Array | None = None
     tape: int | None = None
+    du_dp: Array | None = None
 
 
 Gradient = Callable[[Array], Result]
@@ -43,7 +45,7 @@ def nothing_missing(problem: Problem, **options: Any) -> str | None:
     return None
 
 
-def all_well(**options: Any) -> None:
+def nothing_wrong(**options: Any) -> None:
     return None
 
 
@@ -59,15 +61,16 @@ class Route:
     needs     what a problem must offer
     function  (model, p, **options) -> (J, gradient) or, where staged, -> a function of p returning that;
               its keyword-only parameters are the route's options
-    cost      (n_p, forward, **options) -> Work: the declared bill, n_p parameters, ForwardWork of one solve
-    check     (**options) raises InputError for values that no problem could take
+    cost      (n_p, forward, **options) -> Work: the declared work for n_p parameters and the ForwardWork of one solve
+    check     (**options) raises InputError for values that are wrong for every problem
     missing   (problem, **options) -> a sentence saying what else `problem` lacks, or None
     resolve   (model, p, affordable, **options) -> options, data-dependent defaults filled in by measurement, which
-              ends early where `affordable(options)` says that they have become too dear to go on
-    expect    (model, p, **options) -> options, the same by a cheap estimate
+              ends early where `affordable(options)` is false
+    expect    (model, p, **options) -> options, the same by an inexpensive estimate
     tape      (problem, **options) -> bytes the AD tape is predicted to need for its iterations; None if unknown
-    sound     False for one that is wrong on purpose, which `all` leaves out
+    sound     False for one that is wrong on purpose, which `all` does not include
     accuracy  relative error its gradients have by nature on well-scaled problems; 0: that of the solver
+    step      of differences of J, relative to max(|p_i|, scale_i): noise of J is divided by it; None: it takes none
     """
 
     name: str
@@ -75,13 +78,14 @@ class Route:
     function: Callable[..., Any]
     cost: Callable[..., Work]
     staged: bool = False
-    check: Callable[..., None] = all_well
+    check: Callable[..., None] = nothing_wrong
     missing: Callable[..., str | None] = nothing_missing
     resolve: Callable[..., Options] = as_given
     expect: Callable[..., Options] = as_given
     tape: Callable[..., int | None] | None = None
     sound: bool = True
     accuracy: float = 0.0
+    step: float | None = None
 
     @property
     def summary(self) -> str:
@@ -95,14 +99,14 @@ class Route:
         return {q.name: q.default for q in parameters if q.kind is q.KEYWORD_ONLY}
 
     def objection(self, problem: Problem, **options: Any) -> str | None:
-        """Why this route cannot run on `problem`, in a sentence; None if it can."""
+        """Why this route cannot run on `problem`, as a sentence; None if it can."""
         missing = [o for o in OFFERED_AS if o in self.needs and o not in problem.offers]
         if missing:
             return f"{self.name} needs {OFFERED_AS[missing[-1]]}, which {problem.name} does not offer"
         return self.missing(problem, **self.defaults | options)
 
     def prepare(self, model: Model, p: Array, **options: Any) -> Gradient:
-        """Everything done once for points near p (compilation, say). Raises InputError for unknown options."""
+        """What is done once for points near p, compilation for instance. Raises InputError for unknown options."""
         unknown = options.keys() - self.defaults.keys()
         if unknown:
             raise InputError(f"{self.name}: no option '{min(unknown)}' - choose from {', '.join(self.defaults)}")

@@ -1,4 +1,4 @@
-"""Singular values of a matrix known by its products (Halko, Martinsson & Tropp 2011), or of a whole one by LAPACK."""
+"""Singular values of a matrix given by products (Halko, Martinsson & Tropp 2011), or of a whole matrix by LAPACK."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 from gradient_routes.problems.problem import Array, Operator
 
 OVERSAMPLED = 10  # directions more than singular values wanted
-SWEEPS = 2  # power iterations: (H H^T)^SWEEPS H, so that slow decay still separates
-PROBES = 6  # of what is left out; the bound holds but with probability 1e-6
+SWEEPS = 2  # power iterations: (H H^T)^SWEEPS H separates singular values that decay slowly
+PROBES = 6  # random vectors that bound what is left out; the bound fails with probability 1e-6
 
 
 @dataclass(frozen=True)
 class Svd:
     """The largest singular values s (k,), falling, and their right singular vectors V (n, k).
 
-    beyond        at least the largest one left out, but with probability 1e-6; 0 where none is
+    beyond        an upper bound of the largest one left out, which fails with probability 1e-6; 0 where none is
     blind (n,)    columns that are exactly zero
-    norms (n,)    of the columns, less what is left out: too small by at most `beyond`
+    norms (n,)    of the columns, without what is left out: too small by at most `beyond`
     """
 
     s: Array
@@ -40,8 +40,8 @@ def whole(H: Array) -> Svd:
 def randomized(H: Operator, shape: tuple[int, int], k: int, seed: int = 0) -> Svd:
     """The k largest of H (m, n), by (2 SWEEPS + 2) (k + OVERSAMPLED) + (2 SWEEPS + 1) PROBES products with H or H^T.
 
-    Algorithms 4.4 and 5.1: Q spans what H makes of random directions, B = Q^T H is small. A column of H that is exactly
-    zero is one of B, and but for coincidence no other is.
+    Algorithms 4.4 and 5.1: Q spans the images of random directions, B = Q^T H is small. A column of B is exactly zero
+    where that of H is, and for no other reason but coincidence.
     """
     m, n = shape
     rng = np.random.default_rng(seed)
@@ -66,14 +66,14 @@ def _products(product: Callable[[Array], Array], X: Array) -> Array:
 
 
 def _range(product: Callable[[Array], Array], X: Array) -> Array:
-    """An orthonormal basis of what the product makes of the columns of X."""
+    """An orthonormal basis of the products with the columns of X."""
     return np.linalg.qr(_products(product, X))[0]
 
 
 def _norm_beyond(H: Operator, Q: Array, W: Array) -> float:
     """An upper bound of the norm of E = (I - Q Q^T) H: (4.3) for (E E^T)^SWEEPS E, whose norm is |E|^(2 SWEEPS + 1).
 
-    Of E itself it would bound sqrt(sum of s_j^2), far above the largest where they fall slowly.
+    Applied to E itself it would bound sqrt(sum of s_j^2), far above the largest s_j where they decay slowly.
     """
 
     def outside(y: Array) -> Array:

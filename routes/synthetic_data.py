@@ -1,4 +1,4 @@
-"""Synthetic data: what the sensors would read if the truth were so."""
+"""Synthetic data: the readings of the sensors at the true parameters."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from gradient_routes.problems.problem import Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 
-CONVERGED = Solver(rtol=1e-14)  # data should carry the noise they are given, and no other
+CONVERGED = Solver(rtol=1e-14)  # so that the only noise in the data is the noise asked for
 
 
 def with_synthetic_data(problem: Problem, solver: Solver = CONVERGED) -> Problem:
-    """The problem with data solved for at its true parameters; itself where it has data. One forward solve."""
+    """The problem with the data of its true parameters, by one forward solve; the problem itself where it has data."""
     twin, truth = problem.twin(), problem.truth()
     return problem if twin is None or truth is None else problem.observed(Model(twin, solver).solve(truth).u)

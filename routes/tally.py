@@ -1,4 +1,4 @@
-"""What a gradient costs, in counted work: declared by formulas, measured by counting, compared by ==."""
+"""The cost of a gradient as counted work: declared by formulas, measured by counting, compared by ==."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class Work:
     residuals          evaluations of R
     matvecs            products with R_u or R_u^T, traced iterations included
     assemblies         assemblies of R_u
-    factorizations     numeric factorizations of R_u, all its load cases at once; those PARDISO makes of R_u^T for the
-                       first transposed substitution with a matrix that is not symmetric are that substitution's
+    factorizations     numeric factorizations of R_u, all its load cases together. Not those of R_u^T that PARDISO makes
+                       for the first transposed substitution with a matrix that is not symmetric
     solves             substitutions with factors of R_u, one per right-hand side
     transposed_solves  substitutions with factors of R_u^T, one per right-hand side
     """
@@ -44,7 +44,7 @@ KINDS = tuple(f.name for f in fields(Work))
 
 
 class Tally:
-    """Counts work as it passes a Model's doorways. Only ever incremented: take `work` before, subtract after."""
+    """Counts the work of a Model. It only grows: subtract the `work` before from the `work` after."""
 
     def __init__(self) -> None:
         self._counts = dict.fromkeys(KINDS, 0)
@@ -54,5 +54,5 @@ class Tally:
 
     @property
     def work(self) -> Work:
-        """The counts so far, a value that later counting leaves as it is."""
+        """The counts so far, as a value that later counting does not change."""
         return Work(**self._counts)

@@ -16,13 +16,19 @@ Inner = Annotated[
     Literal["cg", "richardson", "jacobi", "direct"] | None,
     "the iteration on the tape; direct: Newton steps with their factors [cg on the linear bar, direct on others]",
 ]
-Iterations = Annotated[int | None, "k, a Newton step's; direct: Newton steps [what the forward tolerance needs at p]"]
+Iterations = Annotated[
+    int | None, "k, in each Newton step; direct: Newton steps [what the forward tolerance needs at p]"
+]
 NewtonSteps = Annotated[int | None, "Newton steps around them [1 on linear problems, else as the forward solve]"]
-Checkpoint = Annotated[int | None, "keep every so-manieth iterate on the tape, work out the others again [all]"]
-KEPT = {"cg": (3, 73), "richardson": (2, 0), "jacobi": (2, 0)}  # per iteration: (n_u,) arrays, bytes of scalars
-CARRIED = {"cg": (2, 24), "richardson": (1, 8), "jacobi": (2, 0)}  # the same of a checkpoint
-TYPICAL = 5  # Newton steps
-NEVER = 10**15  # where an estimate of k ends: no machine iterates longer
+Checkpoint = Annotated[int | None, "keep the iterates 0, c, 2 c, ... on the tape and recompute the others [all]"]
+KEPT = {
+    "cg": (3, 73),
+    "richardson": (2, 0),
+    "jacobi": (2, 0),
+}  # on the tape, an iteration: (n_u,) arrays, bytes of scalars
+CARRIED = {"cg": (2, 24), "richardson": (1, 8), "jacobi": (2, 0)}  # the same for a checkpoint
+TYPICAL = 5  # number of Newton steps where it is not known yet
+NEVER = 10**15  # largest estimate of k: more than any machine can do
 
 
 def cost(
@@ -42,7 +48,8 @@ def check(*, inner: str | None, iterations: int | None, newton: int | None, chec
             raise InputError(f"unrolled-ad: {name}={count} - choose at least 1")
     if inner == "direct" and (newton, checkpoint) != (None, None):
         raise InputError(
-            "unrolled-ad: inner=direct counts its Newton steps by iterations= and keeps them all - give no more"
+            "unrolled-ad: inner=direct counts its Newton steps by iterations= and keeps them all - give neither newton="
+            " nor checkpoint="
         )
 
 
@@ -100,9 +107,9 @@ def resolve(
     newton: int | None,
     checkpoint: int | None,
 ) -> Options:
-    """k as counted by iterating until the forward tolerance is met, or until that is no longer affordable.
+    """k from iterating until the forward tolerance is met, or until the gradient is no longer affordable.
 
-    On nonlinear problems k is what the systems at both ends of the Newton iteration need.
+    On nonlinear problems k is the larger number of the linear systems at the first and the last Newton step.
     """
     problem, inner = model.problem, chosen(model.problem, inner)
     state = None if problem.linear else model.solve(p)
@@ -127,14 +134,14 @@ def resolve(
 
 
 def near(problem: Problem, u: Array) -> Array:
-    """A state near u whose residual is no rounding: of the size Newton's last steps correct."""
+    """A state near u whose residual is not rounding but of the size that the last Newton steps correct."""
     return u * (1.0 + 1e-4 * np.sin(np.arange(len(u))))
 
 
 def tape(
     problem: Problem, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None
 ) -> int | None:
-    """None for factors: their fill is not known before."""
+    """None where factors are kept, whose fill is not known in advance."""
     inner = chosen(problem, inner)
     if inner == "direct":
         return None
@@ -226,10 +233,12 @@ def through_newton(model: Model, k: int) -> Gradient:
 
 
 def finished(model: Model, p: Array, u: Any, J: Any, dJ_dp: Any, tape: int, what: str) -> Result:
-    """The result, its residual measured; raises Overflow where a sweep left float64's range."""
+    """The result with its residual. Raises Overflow where a sweep exceeded the range of float64."""
     dJ_dp = np.asarray(dJ_dp)
     if not np.isfinite(J):
-        raise Overflow(f"unrolled-ad: J = {J:g} after {what}: they diverge from the initial state - take implicit-ad")
+        raise Overflow(
+            f"unrolled-ad: J = {J:g} after {what}: the iteration diverges from the initial state - take implicit-ad"
+        )
     if not np.isfinite(dJ_dp).all():
         raise Overflow(
             f"unrolled-ad: J = {J:g}, but the backward sweep of {what} overflowed: it amplifies rounding where R_u is"

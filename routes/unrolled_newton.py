@@ -11,15 +11,15 @@ from gradient_routes.routes.model import Model
 from gradient_routes.routes.solvers.solver import Factorization
 
 
-class Kept:
-    """What one Newton step leaves on the tape: arrays u, p, du as leaves, factors of R_u(u, p) as a constant."""
+class TapedStep:
+    """A Newton step on the tape: arrays u, p, du as leaves, factors of R_u(u, p) as a constant."""
 
     def __init__(self, u: Any, p: Any, du: Any, factors: Factorization) -> None:
         self.u, self.p, self.du, self.factors = u, p, du, factors
 
 
-# rebuilding it needs no leaves: they are there to be counted as bytes of the tape
-jax.tree_util.register_pytree_node(Kept, lambda kept: ((kept.u, kept.p, kept.du), kept), lambda kept, leaves: kept)
+# the leaves are declared so that they count as bytes of the tape; the object itself is passed on
+jax.tree_util.register_pytree_node(TapedStep, lambda kept: ((kept.u, kept.p, kept.du), kept), lambda kept, leaves: kept)
 
 
 class UnrolledNewton:
@@ -53,14 +53,14 @@ class UnrolledNewton:
             u = self._step(u, p)
         return u
 
-    def _forward(self, u: Any, p: Any) -> tuple[Any, Kept]:
+    def _forward(self, u: Any, p: Any) -> tuple[Any, TapedStep]:
         model, u_, p_ = self.model, np.asarray(u), np.asarray(p)
         factors = model.factorize(model.tangent(u_, p_))
         du = model.newton_correction(factors, model.residual(u_, p_))
         self.factor_bytes += factors.nbytes
-        return u - du, Kept(u, p, jnp.asarray(du), factors)
+        return u - du, TapedStep(u, p, jnp.asarray(du), factors)
 
-    def _backward(self, kept: Kept, u_bar: Any) -> tuple[Any, Any]:
+    def _backward(self, kept: TapedStep, u_bar: Any) -> tuple[Any, Any]:
         w = self.model.solve_transposed(kept.factors, -np.asarray(u_bar))
         by_u, by_p = self._pullback(kept.u, kept.p, kept.du, w)
         return u_bar + by_u, by_p

@@ -11,7 +11,7 @@ from gradient_routes.bench.cases.machine import available_bytes
 from gradient_routes.bench.units import size
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Problem
-from gradient_routes.problems.subspace import Restricted, components, directions
+from gradient_routes.problems.subspace import Subspace, components, directions
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Partial:
         if self.seed < 0:
             raise InputError(f"--seed {self.seed} - give a whole number >= 0")
 
-    def restrict(self, problem: Problem, p: Array) -> Restricted | None:
+    def restrict(self, problem: Problem, p: Array) -> Subspace | None:
         """The problem in these few parameters; None where they are all there are."""
         n_p = len(p)
         if self.kind == "components":

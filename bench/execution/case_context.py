@@ -55,7 +55,7 @@ class CaseContext:
         self.build_s, self.problem = seconds_of(spec)
         self.p = point(self.problem, settings.at)
         self.n_p = len(self.p)
-        if settings.fields and type(self.problem).fields is Problem.fields:
+        if settings.fields and Offers.FIELDS not in self.problem.offers:
             raise InputError(f"{self.problem.name}: has no mesh to write fields on - drop --vtu")
         if settings.columns is not None:
             check_columns(settings.columns, self.problem.name, self.n_p)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from statistics import median
 from typing import Any
@@ -27,9 +27,10 @@ from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Found, Judge, norm2
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
-from gradient_routes.problems.errors import DomainError, InputError
+from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State
 from gradient_routes.routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
@@ -285,5 +286,22 @@ def _count(
     state = context.price()[1]
     if state is not None:
         record.add({"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)})
-        if context.problem.structure == "spd" and "L D L^T" in state.factors.name:
-            record.note("R_u is not positive definite at u: factorized as L D L^T (an unstable state, buckled say)")
+        with suppress(RoutesError):  # a state at which R_u is singular has no such numbers
+            _note_state(context, route, options, model, state, record)
+
+
+def _note_state(
+    context: CaseContext, route: Route, options: Options, model: Model, state: State, record: Record
+) -> None:
+    """Notes on an unstable state, and on differences of J where the solver leaves noise in it."""
+    unstable = model.negative_eigenvalues(state) if context.problem.structure == "spd" else None
+    if unstable:
+        some = f"{unstable} negative eigenvalue{'s' if unstable > 1 else ''}"
+        record.note(f"R_u has {some} at u: the state is unstable")
+    if model.inexact and route.step is not None:
+        step = options.get("step") or route.step
+        # a solve nearby may end anywhere below the tolerance
+        looser = max(1.0, model.solver.rtol / state.residual) if state.residual else 1.0
+        noise = f"noise of J up to about {looser * model.noise(state):.1g} over steps of {step:.1g}"
+        noise = f"rtol {model.solver.rtol:g}, {noise}"
+        record.note(f"{route.name}: differences J of an inexact Newton solve ({noise}): use --newton full")

@@ -12,7 +12,7 @@ from gradient_routes.bench.cases import registry
 from gradient_routes.bench.execution.slopes import complex_slopes
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array, Offers, Operator, Reference
-from gradient_routes.problems.subspace import Restricted, directions
+from gradient_routes.problems.subspace import Subspace, directions
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Route
 
@@ -124,7 +124,7 @@ class Judges:
         """Whether a judge's J is not the J of real solves: where R(u, p) = 0 has several solutions it may be."""
         return J is not None and abs(J - self._J) > SAME * self._terms
 
-    def _slopes(self, route: Route, few: Restricted) -> Array:
+    def _slopes(self, route: Route, few: Subspace) -> Array:
         solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol))
         if route.name == "complex-step":
             return complex_slopes(Model(self.model.problem, solver), self.p, np.asarray(few.V))

@@ -62,7 +62,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         closed=False,
         label=parameters.label,
         tighten=tighten,
-        refine=None if type(problem).refined is Problem.refined else refine,
+        refine=refine if Offers.REFINED in problem.offers else None,
         active_set=_active_set(problem, solver),
         accuracy=route.accuracy,
     )
@@ -91,7 +91,7 @@ def _iterated(options: Options, factor: float) -> Options:
 
 def _active_set(problem: Problem, solver: Solver) -> Callable[[Array], Hashable] | None:
     """p -> active set of the solved state; None where the problem has none."""
-    if Offers.SOLVE not in problem.offers or type(problem).active_set is Problem.active_set:
+    if Offers.SOLVE | Offers.ACTIVE_SET not in problem.offers:
         return None
     model = Model(problem, solver)
 

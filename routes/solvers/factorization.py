@@ -16,7 +16,7 @@ from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.solvers.superlu import SparseFactorization
-from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, ChainFactorization
+from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, TridiagonalFactorization
 
 
 class Factorizer:
@@ -36,7 +36,7 @@ class Factorizer:
         if self.solver.takes(A):
             return self._factorize(A, who)
         if isinstance(A, Tridiagonal):
-            return ChainFactorization(A, who)
+            return TridiagonalFactorization(A, who)
         if isinstance(A, BorderedTridiagonal):
             return BorderedFactorization(A, who)
         return DenseFactorization(A, who) if isinstance(A, np.ndarray) else SparseFactorization(A, who)
@@ -69,11 +69,14 @@ class DenseFactorization(Factorization):
 
     @property
     def negative_eigenvalues(self) -> int | None:
-        """Of the eigenvalues themselves: pivots of L U do not tell."""
+        """By L D L^T of Bunch & Kaufman, D being block diagonal with blocks up to 2 x 2: pivots of L U do not tell."""
+        from scipy.linalg import eigvalsh_tridiagonal, ldl
+
         A = self._A
         if np.iscomplexobj(A) or not np.allclose(A, A.T, rtol=1e-12, atol=0.0):
             return None
-        return int((np.linalg.eigvalsh(A) < 0.0).sum())
+        D = ldl(A)[1]
+        return int((eigvalsh_tridiagonal(np.diag(D), np.diag(D, -1)) < 0.0).sum())
 
 
 class BlockFactorization(Factorization):

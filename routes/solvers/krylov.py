@@ -22,11 +22,11 @@ TRIED = 3  # products before their mean contraction is extrapolated
 
 @dataclass(frozen=True)
 class Iterated:
-    """x (n_u,) after `products` products with A; as many substitutions, and one more where it converged.
+    """x (n_u,) after `products` products with A and as many substitutions, one more where it converged.
 
-    rate       mean contraction of |r|_inf a product
+    rate       mean contraction of |r|_inf by a product
     converged  the last correction is expected to reach the tolerance
-    breakdown  why the iteration could not go on, where it could not
+    breakdown  why the iteration could not be continued, None where it could
     """
 
     x: Array
@@ -106,7 +106,7 @@ def conjugate_residuals(
 ) -> Iterated:
     """The same for any A: generalized conjugate residuals, the iterates of GMRES (Eisenstat, Elman & Schultz 1983).
 
-    Every product is kept: memory grows by two vectors a product. Breaks down where a direction lowers |r| no more.
+    All products are kept: two vectors each. Breaks down where a direction does not lower |r|.
     """
     x, r = np.zeros_like(b), b
     start = size = norm(b)
@@ -120,7 +120,7 @@ def conjugate_residuals(
         length = math.sqrt(abs(dot(np.conj(Ad), Ad)))
         share = dot(np.conj(Ad), r)
         if not (length > 0.0 and abs(share) > 0.0):
-            stands = f"|A d| = {length:.3g}, A d orthogonal to r: the iteration stands still"
+            stands = f"|A d| = {length:.3g}, A d orthogonal to r: the iteration stagnates"
             return Iterated(x, len(directions) + 1, rate, False, stands)
         d, Ad = d / length, Ad / length
         directions.append((d, Ad))
@@ -135,7 +135,7 @@ def conjugate_residuals(
 
 
 def products_to(rate: float, size: float, wanted: float) -> float:
-    """Products to expect until a residual of `size` is down to `wanted`."""
+    """Expected number of products until a residual of `size` is at most `wanted`."""
     if size <= wanted or rate <= 0.0:
         return 0.0
     return math.log(wanted / size) / math.log(rate) if 0.0 < wanted and rate < 1.0 else math.inf

@@ -1,4 +1,4 @@
-"""A linear solver that factorizes nothing: conjugate gradients preconditioned by smoothed-aggregation multigrid."""
+"""A linear solver without factors: conjugate gradients preconditioned by smoothed-aggregation multigrid."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gradient_routes.routes.solvers.krylov import conjugate_gradients
 from gradient_routes.routes.solvers.solver import Factorization, Factorize, LinearSolver
 from gradient_routes.routes.solvers.superlu import is_sparse
 
-RTOL = 1e-13  # |b - A x|_inf / |b|_inf: a digit below what Newton's method and refined adjoints ask for
+RTOL = 1e-13  # |b - A x|_inf / |b|_inf: a tenth of the tolerance of Newton's method and of refined adjoints
 AT_MOST = 500  # products
 
 
 class MultigridFactorization(Factorization):
     """Solves A x = b, A symmetric positive definite, to |b - A x|_inf <= 1e-13 |b|_inf or to rounding.
 
-    The hierarchy (Vanek, Mandel & Brezina 1996; of pyamg) is built on the near-kernel its pattern knows. A solve raises
+    The hierarchy (Vanek, Mandel & Brezina 1996; by pyamg) uses the near-kernel of the matrix pattern. A solve raises
     NotConverged where the iteration stalls, SingularMatrix where A turns out not to be positive definite.
     """
 
@@ -41,7 +41,7 @@ class MultigridFactorization(Factorization):
             _blocked(self._A, A.pattern.near_nullspace),
             B=A.pattern.near_nullspace,
             symmetry="symmetric",
-            improve_candidates=None,  # sweeps that take longer than the solve and save it nothing
+            improve_candidates=None,  # these sweeps take longer than the solve and do not shorten it
         )
         self._cycle = levels.aspreconditioner()
         self.norm = A.norm

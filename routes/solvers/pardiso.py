@@ -1,4 +1,4 @@
-"""Sparse factors by MKL PARDISO: nested dissection, analyses kept for reuse, singular matrices refused."""
+"""Sparse factors by MKL PARDISO: nested dissection, analyses kept for reuse, singular matrices rejected."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ KINDS = {
 ORDERING, PIVOT_EPS, SCALING, TRANSPOSED, MATCHING, PERTURBED, ANALYSIS_KB, FACTORS_KB = 1, 9, 10, 11, 12, 13, 15, 16
 NEGATIVE = 22  # eigenvalues of a symmetric matrix
 # nested dissection takes 0.6 of the time of minimum degree, the default, on a solid of 14 000 unknowns; pivots below
-# 1e-12 |A| count as zero: a body without clamp leaves rounding there, and the default takes it for a pivot
+# 1e-12 |A| count as zero: for a body without supports they are rounding, which the default accepts as pivots
 SETTINGS = {ORDERING: 2, PIVOT_EPS: 12}
 UNSYMMETRIC = {SCALING: 1, MATCHING: 1}
-EXHAUSTED = "not enough memory"  # what PARDISO says
-IDLE = 6  # two for each of three load cases: analyses kept for reuse, a pattern and kind
+EXHAUSTED = "not enough memory"  # in the message of PARDISO
+IDLE = 6  # analyses kept for reuse, for each pattern and kind: two for each of three load cases
 
 Idle = dict[tuple[int, bool], list[Any]]
 
@@ -83,10 +83,10 @@ class PardisoFactorization(Factorization):
         except RuntimeError as error:
             if EXHAUSTED in str(error):
                 raise MemoryError(f"factors of R_u ({A.shape[0]} unknowns): {error}") from error
-            raise self._refusal(A, str(error)) from error
+            raise self._rejection(A, str(error)) from error
         missed = solution_error(A.T if transposed else A, lambda b: self._substitute(solver, b))
         if not missed < REGULAR:  # a singular L L^T may go unnoticed
-            raise self._refusal(A, f"a known solution is missed by {missed:.2g}")
+            raise self._rejection(A, f"a known solution is missed by {missed:.2g}")
         weakref.finalize(self, _keep, waiting, solver)
         return solver
 
@@ -99,10 +99,10 @@ class PardisoFactorization(Factorization):
         solver = PardisoSolver(A.rows if unsymmetric else A.upper, self._mtype, settings)
         perturbed = solver.get_iparm_value(PERTURBED)
         if perturbed:
-            raise self._refusal(A, f"{perturbed} of its pivots are zero to 12 digits")
+            raise self._rejection(A, f"{perturbed} of its pivots are zero to 12 digits")
         return solver
 
-    def _refusal(self, A: Any, why: str) -> SingularMatrix:
+    def _rejection(self, A: Any, why: str) -> SingularMatrix:
         what = f"{self._who}: R_u ({A.shape[0]} unknowns) has no {KINDS[self._mtype]}"
         return SingularMatrix(f"{what}: {why} - check p and the supports")
 

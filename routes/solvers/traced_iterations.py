@@ -1,4 +1,4 @@
-"""Iterations on K du = f, every step traceable: what unrolled AD puts on its tape.
+"""Iterations on K du = f with traceable steps: what unrolled AD puts on its tape.
 
 A system is given by at = (u, p): K = R_u(u, p), f = -R(u, p). Linear problems are solved by the iterations of one
 system, nonlinear ones by those of every Newton step. They start at du = 0, so r = f. Each step costs one product with
@@ -17,7 +17,7 @@ from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.problem import Traced
 
 PRODUCTS = ("gradient_routes_matvec", "gradient_routes_matvec_transposed")
-CONVERGED = 1e-30  # |r| / |f| at which CG stands still: what follows would be 0 / 0
+CONVERGED = 1e-30  # |r| / |f| at which CG ends: the next step would be 0 / 0
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Iteration:
     def iterate(self, at: Any, k: int, checkpoint: int | None = None) -> Any:
         """du_k (n_u,) by jax.lax.scan, differentiable.
 
-        With `checkpoint` c only every c-th carry is kept for the backward sweep; those between are worked out again.
+        With `checkpoint` c only every c-th carry is kept for the backward sweep; those between are recomputed.
         """
 
         def steps(carry: Any, count: int) -> Any:
@@ -83,7 +83,7 @@ def iteration(inner: str, traced: Traced) -> Iteration:
 
 
 def _known(function: Callable[[Any], Any] | None) -> Callable[[Any], Any]:
-    assert function is not None, "the route objects to problems that lack it"
+    assert function is not None, "the route rejects problems that lack it"
     return function
 
 
@@ -105,7 +105,7 @@ def conjugate_gradients(matvec: Callable[[Any, Any], Any], f: Callable[[Any], An
     def step(at: Any, carry: tuple[Any, ...]) -> tuple[Any, ...]:
         u, r, d, rr, rd, ff = carry
         Kd = matvec(at, d)
-        # the unused branch of a `where` still enters the derivative: keep its numbers finite, too
+        # the unused branch of a `where` enters the derivative, too: its numbers must be finite
         moving = rr > CONVERGED**2 * ff
         alpha = jnp.where(moving, rd / jnp.where(moving, d @ Kd, 1.0), 0.0)
         u, r = u + alpha * d, r - alpha * Kd
@@ -150,10 +150,10 @@ def product_with_R_u(traced: Traced) -> Callable[[Any, Any], Any]:
 
 
 def count_products(jaxpr: Any) -> int:
-    """Products with R_u or its transpose that a traced program executes, read off the program itself.
+    """Products with R_u or its transpose that a traced program executes, read from the program itself.
 
-    Products stand in innermost loops only: what JAX has moved out of a loop under the product's name is what the
-    loop's products share.
+    Products are in innermost loops only: what JAX has moved out of a loop under the name of the product is common to
+    the products in the loop.
     """
     return _count(jaxpr)[1]
 

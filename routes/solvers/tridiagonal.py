@@ -1,4 +1,6 @@
-"""Chains of springs solved by cumulative sums in O(N), the last node free, on a spring or held by a multiplier."""
+"""Tridiagonal systems of chains of springs, solved by cumulative sums in O(N); the last node is free, on a spring, or
+constrained by a multiplier.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +12,11 @@ from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization
 
 
-class ChainFactorization(Factorization):
+class TridiagonalFactorization(Factorization):
     """B^T D B is its own factorization: its inverse is B^{-1} D^{-1} B^{-T}, two cumulative sums.
 
     With a spring k behind the last node, the correction of rank one (Sherman & Morrison 1950) is written as the force
-    t = b_N - k u_N in the last element: no difference of large numbers, however stiff the spring.
+    t = b_N - k u_N in the last element, which is no difference of large numbers for any k.
     """
 
     name = "cumulative sums"
@@ -30,11 +32,11 @@ class ChainFactorization(Factorization):
 
     def substitute(self, b: Array, transposed: bool) -> Array:
         if not self.end_spring:
-            forces = cumulative_sum(b[::-1])[::-1]  # B^{-T} b: what hangs behind each element
+            forces = cumulative_sum(b[::-1])[::-1]  # B^{-T} b: the sum of the loads behind each element
             return cumulative_sum(forces / self.D)
-        h, w_N, C = hung(self.D, b)
+        h, w_N, C = without_last(self.D, b)
         t = (b[-1] - self.end_spring * w_N) / (1.0 + self.end_spring * C)
-        return stretched(self.D, h, t, (w_N + C * b[-1]) / (1.0 + self.end_spring * C))
+        return displacements(self.D, h, t, (w_N + C * b[-1]) / (1.0 + self.end_spring * C))
 
     @property
     def negative_eigenvalues(self) -> int | None:
@@ -45,7 +47,7 @@ class ChainFactorization(Factorization):
 
 
 class BorderedFactorization(Factorization):
-    """L D L^T of a chain with a multiplier on its last node: the nodes before it one by one, then those two at once.
+    """L D L^T of a chain with a multiplier on its last node: the nodes before it one by one, then these two together.
 
     Their 2 x 2 pivot [[1/C + c, 1], [1, 0]], C the compliance of the whole chain, has the determinant -1: it is regular
     and has the one negative eigenvalue. Inactive, the pivots are those of the chain and -1/c.
@@ -67,9 +69,9 @@ class BorderedFactorization(Factorization):
             forces = cumulative_sum(b[-2::-1])[::-1]
             return np.concatenate([cumulative_sum(forces / self.D), -self.c * b[-1:]])
         u_N = b[-1]
-        h, w_N, C = hung(self.D, b[:-1])
+        h, w_N, C = without_last(self.D, b[:-1])
         t = (u_N - w_N) / C
-        return np.append(stretched(self.D, h, t, u_N), b[-2] - self.c * u_N - t)
+        return np.append(displacements(self.D, h, t, u_N), b[-2] - self.c * u_N - t)
 
     @property
     def negative_eigenvalues(self) -> int | None:
@@ -84,14 +86,14 @@ def check_positive(D: Array, who: str) -> None:
         raise SingularMatrix(f"{who}: stiffness {D[e]:g} of element {e + 1} is not positive - check its modulus")
 
 
-def hung(D: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Of all loads b (N,) but b_N: forces h (N,) in the elements, the displacement of the last node; C = sum 1 / D."""
+def without_last(D: Array, b: Array) -> tuple[Array, Array, Array]:
+    """For all loads b (N,) but b_N: element forces h (N,) and the displacement of the last node; C = sum 1 / D."""
     h = np.append(cumulative_sum(b[-2::-1])[::-1], 0.0)
     return h, (h / D).sum(), (1.0 / D).sum()
 
 
-def stretched(D: Array, h: Array, t: Array, u_N: Array) -> Array:
-    """Displacements (N,) under element forces h + t; the last is known better than by their sum."""
+def displacements(D: Array, h: Array, t: Array, u_N: Array) -> Array:
+    """Displacements (N,) under element forces h + t; the last one, u_N, is given more exactly than by their sum."""
     u = cumulative_sum((h + t) / D)
     u[-1] = u_N
     return u

@@ -13,7 +13,7 @@ from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.problem import Problem
+from gradient_routes.problems.problem import Offers, Problem
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.tangent import tangent
@@ -27,7 +27,7 @@ MORE = {
     "block[amplitude]": lambda: Block(n=2, alpha=0.1, phi="amplitude"),
     "block[grip]": lambda: Block(n=2, unknown="load", load="displacement", alpha=0.1),
 }
-SUMS = {name: p for name, p in zoo().items() if type(p).observation is not Problem.observation}  # of squares
+SUMS = {name: p for name, p in zoo().items() if Offers.OBSERVATION in p.offers}  # of squares
 PROBLEMS = {name: (lambda problem=problem: problem) for name, problem in SUMS.items()} | MORE
 
 

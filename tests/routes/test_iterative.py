@@ -21,7 +21,7 @@ from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.solvers.factorization import Factorizer
-from gradient_routes.routes.solvers.iterative import DESCENT, ROUNDING, solver
+from gradient_routes.routes.solvers.iterative import DESCENT, ROUNDING, _conjugate_gradients, solver
 from gradient_routes.routes.tally import Work
 from gradient_routes.routes.tangent import tangent
 
@@ -96,6 +96,20 @@ def test_steepest_descent_that_grows_is_not_followed_into_infinity() -> None:
     assert abs(np.ones(2) - A @ x).max() <= 1e-2
 
 
+def test_growth_of_the_residual_tells_indefinite_matrices_from_badly_conditioned_ones() -> None:
+    """|r|^2 grows to at most cond(A) |b|^2 where A is definite: cond / 4 is reached, 1 / eps times more is not."""
+    cond = 1e14
+    A, b = np.diag([cond, 1.0]), np.array([cond**-0.5, 1.0])
+    dx, _ = _conjugate_gradients(A, b, 0.0, 1, memory=False)
+    assert np.sum((b - A @ dx) ** 2) > 0.2 * cond
+    dx, products = _conjugate_gradients(A, b, 1e-3, 10, memory=False)
+    assert dx is not None
+    assert products == 10
+    dx, products = _conjugate_gradients(np.diag([1.0, -0.3]), np.ones(2), 1e-2, 1000, memory=False)
+    assert dx is None
+    assert 20 < products < 40  # |r|^2 grows by 3.46 a step, 1 / eps = 3.46^29
+
+
 @pytest.mark.parametrize("stop", ["penalty", "softplus", "quadratic", "multiplier"])
 def test_a_bar_behind_a_stop_is_solved_by_iterations(stop: str) -> None:
     bar = Bar(stop=stop)
@@ -138,6 +152,27 @@ def test_refined_solves_end_at_the_tolerance_too() -> None:
         adjoint.prepare(model, block.parameters.start)(block.parameters.start)
         products.append(model.tally.work.matvecs)
     assert products[0] < products[1]
+
+
+def test_refined_solves_meet_their_tolerance_and_do_little_more() -> None:
+    """The last correction is not checked: it relies on a margin, which costs products."""
+    follower = Block(nx=1, ny=1, nz=2, parametrization="raw", derivatives="hand", load="follower", cases=2)
+    ratios, products, rng = [], 0, np.random.default_rng(0)
+    for problem in (Block(n=2, derivatives="hand"), Bar(n=8, stop="softplus", width=0.3), follower):
+        p = problem.parameters.start
+        for rtol in (1e-1, 1e-2, 1e-3, 1e-4):
+            state = Model(problem, Solver(rtol=rtol)).solve(p)
+            R_u = problem.tangent(state.u, p)
+            for adjoint_rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10):
+                model, b = Model(problem, Solver(adjoint_rtol=adjoint_rtol)), rng.standard_normal(problem.n_state)
+                linearized = LinearizedSolver(model, state, "refined")
+                x = linearized.solve(b)
+                if linearized.R_u is not None:  # else new factors were made
+                    ratios.append(abs(b - R_u @ x).max() / abs(b).max() / adjoint_rtol)
+                    products += model.tally.work.matvecs
+    assert len(ratios) > 60
+    assert max(ratios) < 0.5
+    assert products < 187
 
 
 @pytest.mark.parametrize("problem", ["bar", "block[n=2]", "block[nx=1,ny=1,nz=2,load=follower,cases=2]"])

@@ -99,7 +99,7 @@ def test_an_indefinite_matrix_breaks_conjugate_gradients_down() -> None:
     assert "not positive definite" in str(done.breakdown)
     rotation = np.array([[0.0, -1.0], [1.0, 0.0]])
     done, _, _ = iterate(conjugate_residuals, rotation, np.array([1.0, 0.0]), 1e-12)
-    assert "stands still" in str(done.breakdown)
+    assert "stagnates" in str(done.breakdown)
 
 
 NONLINEAR = {name: problem for name, problem in zoo().items() if not problem.linear and problem.line_search}

@@ -97,7 +97,7 @@ def kink(ray: Ray, routes: Sequence[RouteSpec], s: Sequence[float], budget: floa
     take more than `budget` seconds, are skipped. Raises InputError where the problem has no active set.
     """
     problem = ray.problem
-    if Offers.SOLVE not in problem.offers or type(problem).active_set is Problem.active_set:
+    if Offers.SOLVE | Offers.ACTIVE_SET not in problem.offers:
         raise smooth(problem)
     visits = tuple(visit(ray, float(one)) for one in s)
     solved = [v for v in visits if v.reason is None]

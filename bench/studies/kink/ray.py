@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from gradient_routes.bench.cases.case import RouteSpec
-from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, State
@@ -57,8 +56,8 @@ class Ray:
         return self.problem.active_set(self.solve(s).u, self.p(s))
 
     def tip(self, u: Array) -> float | None:
-        """u_N [m] of a bar."""
-        return float(u[self.problem.n - 1]) if isinstance(self.problem, Bar) else None
+        """The displacement [m] that a stop limits."""
+        return self.problem.tip(u)
 
 
 class Gradients:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.studies.kink.ray import Gradients, Ray, bisect
-from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.contact import CompliantStop, Penalty, Quadratic, RigidStop, Softplus
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Problem
@@ -59,8 +58,8 @@ class Trade:
 
 
 def yielding(problem: Problem) -> CompliantStop | None:
-    """The stop of a bar that gives way, or None."""
-    return problem.stop if isinstance(problem, Bar) and isinstance(problem.stop, CompliantStop) else None
+    """The stop that gives way, or None."""
+    return problem.stop if isinstance(problem.stop, CompliantStop) else None
 
 
 def width_of(stop: CompliantStop) -> float | None:
@@ -88,10 +87,8 @@ def trade(ray: Ray, stop: CompliantStop, route: RouteSpec, low: float, high: flo
 
     Raises what a solve of exact contact at s = 1 raises.
     """
-    bar = ray.problem
-    assert isinstance(bar, Bar)
-    exact = replace(ray, problem=bar.with_stop(RigidStop(stop.gap)))
-    rays = [(one, replace(ray, problem=bar.with_stop(one))) for one in variants(stop)]
+    exact = replace(ray, problem=ray.problem.with_stop(RigidStop(stop.gap)))
+    rays = [(one, replace(ray, problem=ray.problem.with_stop(one))) for one in variants(stop)]
 
     def compared(s: float, sides: Sequence[float]) -> list[Traded]:
         J, gradients = exact.objective(s), Gradients(exact, route)

@@ -15,9 +15,7 @@ from gradient_routes.bench.units import duration
 from gradient_routes.bench.verification.check import check
 from gradient_routes.bench.verification.plan import Plan
 from gradient_routes.bench.verification.registered import subject
-from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.errors import InputError, NotConverged, SingularMatrix
-from gradient_routes.problems.problem import Problem
 from gradient_routes.routes.newton import Solver
 
 LONGEST = 12  # digits of a number that are read
@@ -43,7 +41,8 @@ def run(
     checked(budget)
     spec = one_route(route)
     made, p = problem_at(selector, at)
-    few = _default(made) if components is None else _components(components, len(p))
+    few: int | tuple[int, ...] = FEW if made.typical is None else (made.typical,)
+    few = few if components is None else _components(components, len(p))
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     judged = subject(made, spec.route, spec.options, p, solver)
     with suppress(NotConverged, SingularMatrix):  # a solve that fails is part of the verdict
@@ -52,13 +51,6 @@ def run(
     with stdout_to_stderr():
         found = check(judged, plan)
     return conclude(say, found, {"problem": selector, "route": route, "at": at}, html)
-
-
-def _default(problem: Problem) -> int | tuple[int, ...]:
-    """Element min(3, M) of a bar whose first M nodes carry sensors: it has some behind it and some before."""
-    if isinstance(problem, Bar) and problem.last_sensor:
-        return (min(3, problem.last_sensor) - 1,)
-    return FEW
 
 
 def _components(text: str, n_p: int) -> int | tuple[int, ...]:

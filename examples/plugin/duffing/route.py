@@ -15,7 +15,7 @@ def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
     return forward.solves(4 * n_p)
 
 
-@route("fd-extrapolated", needs=Offers.VALUE, cost=cost)
+@route("fd-extrapolated", needs=Offers.VALUE, cost=cost, step=STEP)
 def fd_extrapolated(model: Model, p: Array, *, step: Annotated[float | None, "h_i / max(|p_i|, s_i)"] = None) -> Result:
     """(8 (J(p + h) - J(p - h)) - (J(p + 2 h) - J(p - 2 h))) / 12 h (Richardson 1911)."""
     h = (STEP if step is None else step) * model.parameters.natural(p)

@@ -22,7 +22,7 @@ from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Reference
-from gradient_routes.problems.subspace import Restricted, components, directions
+from gradient_routes.problems.subspace import Subspace, components, directions
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.finite_difference import fd_central
@@ -32,7 +32,7 @@ from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Result, Route
 from gradient_routes.routes.tangent import tangent
 
-PARTS: dict[str, Callable[[Problem, Array], Restricted]] = {
+PARTS: dict[str, Callable[[Problem, Array], Subspace]] = {
     "components": lambda problem, p: components(problem, p, np.arange(0, len(p), 2)),
     "directions": lambda problem, p: directions(problem, p, 3, seed=1),
 }
@@ -43,7 +43,7 @@ def parts() -> Iterator[tuple[str, str, Route, dict]]:
     yield from ((part, *case) for part in PARTS for case in pairs(iterated=("bar[raw,alpha]",)) if case[0] in SMALL)
 
 
-def whole(problem: Problem, few: Restricted, p: Array) -> Reference:
+def whole(problem: Problem, few: Subspace, p: Array) -> Reference:
     """V^T of the gradient of the whole, with the size of its terms."""
     full, V = reference(problem, p), np.column_stack([few.V @ e for e in np.eye(len(few.parameters))])
     return Reference("whole", V.T @ full.gradient, float(np.linalg.norm(V)) * full.size)

@@ -17,7 +17,7 @@ from gradient_routes.bench.studies.identify.identifiability import Identified, i
 from gradient_routes.bench.studies.identify.placement import greedy, place
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
-from gradient_routes.problems.problem import Problem
+from gradient_routes.problems.problem import Offers
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.sensitivity import Sensitivity
@@ -26,7 +26,7 @@ from gradient_routes.routes.tangent import tangent
 
 TABLES = ("spectrum", "identified", "experiments", "placement")
 STEP = 1e-30
-SUMS = {name: problem for name, problem in zoo().items() if type(problem).observation is not Problem.observation}
+SUMS = {name: problem for name, problem in zoo().items() if Offers.OBSERVATION in problem.offers}
 PROBLEMS = {name: (lambda problem=problem: problem) for name, problem in SUMS.items()} | {
     "block[grip]": lambda: Block(nx=1, ny=1, nz=2, unknown="load", load="displacement", alpha=0.1),
     "block[cases]": lambda: Block(nx=2, ny=1, nz=1, cases=2, derivatives="hand", alpha=0.1),
@@ -329,7 +329,7 @@ def test_fields_are_written_cell_by_cell(cli) -> None:
 
 WRONG = {
     "--problem bar[sensors=0]": "no sensors, m = 0",
-    "--problem duffing/problem.py:Duffing": "states no observation",
+    "--problem duffing/problem.py:Duffing": "has no observation S u",
     "--problem black.py:Black": "needs the partial derivatives",
     "--noise 0": "--noise 0",
     "--noise nan": "--noise nan",
