@@ -11,7 +11,7 @@ CHECKED := adjoint faulty-adjoint
 TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference docs clean
+.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline mutants reports reference docs clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -77,6 +77,9 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.repeat
 	$(BIN)/python -m benchmarks.reporting
 	$(BIN)/python -m benchmarks.killing
+
+mutants: $(READY) ## 60 small faults in problems, routes and the judge: do the tests fail? (hours)
+	$(BIN)/python -m benchmarks.mutants
 
 reports: $(READY) ## everything in results/ as one page, results/report.html; of the reference run where there is no other
 	$(BIN)/routes report --store $(REPORTED) -o results/report.html

@@ -27,11 +27,17 @@ def installed(minor: str) -> dict[str, str]:
     return found
 
 
+def clear() -> None:
+    """What a build leaves here: modules and entry points that are gone would be found in it."""
+    for left in ("build", "gradient_routes.egg-info"):
+        shutil.rmtree(ROOT / left, ignore_errors=True)
+
+
 def passes(version: str, python: str, tests: list[str]) -> bool:
     """Whether the wheel installs, runs and passes the tests there. The environment is kept in .venvs/."""
     bin = ROOT / ".venvs" / version / "bin"
     pip = [bin / "python", "-m", "pip", "install", "-c", "constraints.txt", "--quiet", "--disable-pip-version-check"]
-    shutil.rmtree(ROOT / "build", ignore_errors=True)  # else modules that are gone would be installed
+    clear()
     steps = (
         [python, "-m", "venv", bin.parent],
         [*pip, ".[test]"],
@@ -40,7 +46,9 @@ def passes(version: str, python: str, tests: list[str]) -> bool:
         [bin / "python", "-m", "pytest", *tests],
     )
     print(f"== Python {version}, {python}", flush=True)
-    return all(subprocess.run(step, cwd=ROOT).returncode == 0 for step in steps)
+    done = all(subprocess.run(step, cwd=ROOT).returncode == 0 for step in steps)
+    clear()
+    return done
 
 
 failed = []

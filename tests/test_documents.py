@@ -105,7 +105,7 @@ def test_the_two_commands_exist_and_do_what_the_readme_says(target: str) -> None
 def test_make_lists_its_targets() -> None:
     listed = shell("make", ROOT).stdout
     gates = "gate baseline benchmark-regression benchmark-baseline"
-    for target in f"help demo test lint type {gates} benchmark reports reference docs clean".split():
+    for target in f"help demo test lint type {gates} benchmark mutants reports reference docs clean".split():
         assert re.search(rf"^{target} ", listed, re.MULTILINE), target
 
 

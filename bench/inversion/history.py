@@ -1,4 +1,4 @@
-"""An inversion, iteration by iteration."""
+"""The accepted steps of an inversion."""
 
 from __future__ import annotations
 
@@ -34,43 +34,44 @@ Watch = Callable[[Iterate], None]
 
 @dataclass
 class History:
-    """Accepted steps as they come, each handed to `watch`. `truth` and the start p_0 are for distances."""
+    """Accepted steps, each passed to `watch`.
+
+    truth, p_0  for |p - p_true| / |p_0 - p_true|
+    offset      iterations of the run that this one resumes
+    """
 
     objective: Objective
     truth: Array | None
     p_0: Array
     watch: Watch = lambda iterate: None
     iterates: list[Iterate] = field(default_factory=list)
-    offset: int = 0  # iterations of a run that this one resumes
+    offset: int = 0
     last: Evaluation | None = None
 
     def take(self, found: Evaluation, says: str | None = None) -> None:
-        """An accepted step; steps that had to come back on the way are said."""
-        walls = [tried.outside for tried in self.objective.tried if tried.outside is not None]
-        if walls and says is None:
-            says = f"a step was shortened: {walls[0]}"
-        misfit, regularization = self.objective.misfit(found)
-        before = self.objective.accepted
-        moved = None if not self.iterates or before is None else found.x - before.x
+        """Record an accepted step, and whether steps before it left the domain of J."""
+        objective = self.objective
+        outside = [tried.outside for tried in objective.tried if tried.outside is not None]
+        if outside and says is None:
+            says = f"a step was shortened: {outside[0]}"
+        moved = float(np.linalg.norm(found.x - objective.accepted.x)) if self.iterates else None
         iterate = Iterate(
             self.offset + len(self.iterates),
             found.J,
-            misfit,
-            regularization,
+            *objective.misfit(found),
             norm2(found.gradient),
-            None if moved is None else float(np.linalg.norm(moved)),
-            self.objective.forward_solves,
-            self.objective.adjoint_solves,
-            self.objective.seconds,
-            self.distance(found.p),
+            moved,
+            objective.forward_solves,
+            objective.adjoint_solves,
+            objective.seconds,
+            self._distance(found.p),
             says,
         )
         self.last = found
         self.iterates.append(iterate)
         self.watch(iterate)
 
-    def distance(self, p: Array) -> float | None:
-        """|p - p_true| / |p_0 - p_true|."""
+    def _distance(self, p: Array) -> float | None:
         if self.truth is None:
             return None
         span = float(np.linalg.norm(self.p_0 - self.truth))

@@ -1,4 +1,4 @@
-"""One inversion: J minimized by an optimizer that sees it through a route, from a start, on record."""
+"""One inversion: J minimized by an optimizer with the gradients of a route, every accepted step recorded."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from gradient_routes.bench.inversion.optimizers import Limits, Name, optimizer
+from gradient_routes.bench.inversion.optimizers import Ended, Limits, Name, optimizer
 from gradient_routes.bench.inversion.variables import Positive, Variables
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
@@ -40,11 +40,11 @@ class Engine:
 
 @dataclass(frozen=True)
 class Inversion:
-    """What came of it: fields are columns of its table, and the arrays behind them.
+    """The result: fields are columns of its table, and the arrays behind them.
 
-    p, gradient (n_p,) at the end; start p_0; truth where known; view, what the problem shows beside; `end` says why it
-    stopped, and `interrupted` that Ctrl-C did; `scaled` says what the optimizer's numbers are in units of, `warning`
-    what is wrong with them.
+    p, gradient (n_p,) at the end; start p_0; truth where known; view: the problem's own columns
+    end      why it stopped; interrupted: by Ctrl-C
+    scaled   the units of the optimizer's variables; warning: what is wrong with them
     """
 
     problem: str
@@ -106,9 +106,9 @@ def invert(
     run: Callable[..., str] | None = None,
     offset: int = 0,
 ) -> Inversion:
-    """Minimize J of a problem, from `start` if given. Ctrl-C ends it, not what it has found.
+    """Minimize J of a problem, from `start` if given. After Ctrl-C the result so far is returned.
 
-    `made` is the problem if it is built already; `run` an optimizer in place of the engine's.
+    made  the problem if it is built already; run: an optimizer in place of the engine's
     Raises InputError, DomainError, and what the first evaluation raises.
     """
     import scipy.optimize  # noqa: F401 - loaded before the clock starts
@@ -121,11 +121,10 @@ def invert(
         raise RoutesError(f"invert: {objection} - choose another route")
     variables = Variables.of(problem.parameters, p, engine.positive, problem.name)
     objective = Objective(problem, route.route, route.options, engine.solver, variables)
-    truth = problem.truth()
-    history = History(objective, truth, p_0, watch, offset=offset)
+    history = History(objective, problem.truth(), p_0, watch, offset=offset)
     interrupted = False
     with redirect_stdout(sys.stderr), np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "The line search algorithm")  # SciPy's: `end` says it, and why
+        warnings.filterwarnings("ignore", "The line search algorithm")  # SciPy's: `end` tells more
         try:
             found = objective.start(p)
             history.take(found, objective.doubt())
@@ -133,6 +132,8 @@ def invert(
                 end = "converged: dJ/dp is 0 at the start"
             else:
                 end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
+        except Ended as ended:
+            end = str(ended)
         except KeyboardInterrupt:
             if not history.iterates:
                 raise
@@ -141,7 +142,7 @@ def invert(
     assert last is not None
     try:
         shown = view(problem, last, engine.solver, complete=not interrupted)
-    except KeyboardInterrupt:  # what was found is not lost with what would be shown beside it
+    except KeyboardInterrupt:  # the result does not depend on the view
         shown, interrupted = ParameterView(), True
     return Inversion(
         spec.name,
@@ -159,7 +160,7 @@ def invert(
         p_0,
         last.p,
         last.gradient,
-        truth,
+        history.truth,
         shown,
         end,
         interrupted,
@@ -169,7 +170,7 @@ def invert(
 
 
 def data(problem: Problem, p: Array) -> Array | None:
-    """What was measured, (m,)."""
+    """The measured data, (m,)."""
     try:
         seen = problem.observation(problem.initial(p), p)
     except RoutesError:

@@ -1,4 +1,4 @@
-"""How much regularization: the L-curve (Hansen 1992), its corner, and what the noise of the data asks for."""
+"""How much regularization: the L-curve (Hansen 1992), its corner, and the discrepancy principle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
-BENT = 3  # points that a curvature takes
+BENT = 3  # points that a curvature needs
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Point:
 
     @property
     def converged(self) -> bool:
-        """Whether it is a minimum, to the tolerance or to rounding: others are no points of the curve."""
+        """Whether it is a minimum, to the tolerance or to rounding; the curve consists of minima."""
         return self.inversion.end.startswith(("converged", AT_MINIMUM))
 
     @property
@@ -45,13 +45,13 @@ class Point:
 def minima(
     spec: ProblemSpec, route: RouteSpec, engine: Engine, alphas: Sequence[float], at: str = "start"
 ) -> Iterator[Inversion]:
-    """J minimized at every alpha, the largest first, each from the minimum before, until one is interrupted.
+    """J minimized at every alpha, largest first, each from the minimum before; an interrupted one is the last.
 
     Raises InputError for a problem without Phi.
     """
     made = spec()
     if made.regularization is None:
-        raise InputError(f"invert: {made.name} has no Phi(p) to weigh - choose a problem with alpha=")
+        raise InputError(f"invert: {made.name} has no Phi(p) to weight - choose a problem with alpha=")
     p: Array | None = None
     for alpha in sorted(map(float, alphas), reverse=True):
         found = invert(spec, route, engine, at, p, made=made.weighted(alpha))
@@ -62,13 +62,13 @@ def minima(
 
 
 def l_curve(found: Sequence[Inversion]) -> list[Point]:
-    """The minima, corner and discrepancy marked."""
+    """The points of the minima, corner and discrepancy marked."""
     return chosen([_point(each) for each in found])
 
 
 def _point(inversion: Inversion) -> Point:
     last, problem, p = inversion.iterates[-1], inversion.made, inversion.p
-    seen = problem.observation(problem.initial(p), p)  # noise and number of the data, whatever the state
+    seen = problem.observation(problem.initial(p), p)  # sigma and the number of data do not depend on the state
     discrepancy = None
     if seen is not None and seen.sigma > 0.0:
         discrepancy = math.sqrt(2.0 * last.misfit) / (seen.sigma * math.sqrt(len(seen.data)))
@@ -76,25 +76,23 @@ def _point(inversion: Inversion) -> Point:
 
 
 def chosen(points: list[Point]) -> list[Point]:
-    """With curvatures; the corner is where the curve bends most, the discrepancy principle's choice the largest alpha
-    whose misfit is no more than noise makes (Morozov 1966).
+    """With curvatures, corner and discrepancy marked.
+
+    The corner is the point of largest curvature; the discrepancy principle (Morozov 1966) chooses the largest alpha
+    whose misfit is at most that of the noise.
     """
     bends = [bend if point.converged else None for bend, point in zip(curvatures(points), points, strict=True)]
-    corner = max((k for k, bend in enumerate(bends) if bend is not None), key=lambda k: bends[k] or 0.0, default=None)
+    corner = max(range(len(points)), key=lambda k: bends[k] or 0.0, default=0)
     met = [k for k, p in enumerate(points) if p.converged and p.discrepancy is not None and p.discrepancy <= 1.0]
-    marks: dict[int, list[str]] = {k: [] for k in range(len(points))}
-    if corner is not None and (bends[corner] or 0.0) > 0.0:
-        marks[corner].append("corner")
-    if met:
-        marks[met[0]].append("discrepancy")
-    return [
-        replace(point, curvature=bend, chosen=", ".join(marks[k]) or None)
-        for k, (point, bend) in enumerate(zip(points, bends, strict=True))
-    ]
+    marked = []
+    for k, (point, bend) in enumerate(zip(points, bends, strict=True)):
+        marks = ["corner"] * (k == corner and (bend or 0.0) > 0.0) + ["discrepancy"] * (met[:1] == [k])
+        marked.append(replace(point, curvature=bend, chosen=", ".join(marks) or None))
+    return marked
 
 
 def curvatures(points: Sequence[Point]) -> list[float | None]:
-    """Of (log misfit, log Phi) over log alpha, by differences; None at the ends and where a logarithm has none."""
+    """Of (log misfit, log Phi) over log alpha, by differences; None at the ends and for values <= 0."""
     if len(points) < BENT or any(point.misfit <= 0.0 or point.phi <= 0.0 for point in points):
         return [None] * len(points)
     t = np.log([point.inversion.alpha for point in points])

@@ -1,4 +1,4 @@
-"""J as a sum of squares, 1/2 |r(x)|^2, r = (S u - d, rho): what Gauss-Newton methods see beside a gradient."""
+"""J as a sum of squares, 1/2 |r(x)|^2 with r = (S u - d, rho), and the Gauss-Newton methods that use it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from gradient_routes.bench.inversion.diagnosis import explained
 from gradient_routes.bench.inversion.history import History
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from gradient_routes.bench.inversion.optimizers import Ended, Limits, Watching, accept, spent, start_of
+from gradient_routes.bench.inversion.optimizers import Ended, Limits, accept, minimized, spent
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.newton import State
 from gradient_routes.routes.sensitivity import Sensitivity
 
-WALL = 30.0  # times the residuals of the last step, where J is not defined: no region can be trusted there
+BEYOND = 30.0  # residuals where J is not defined, in those of the last step: no trust region extends there
 LSMR = {"regularize": False, "atol": 1e-8, "btol": 1e-8}  # whole Gauss-Newton steps
 TRIALS = 20  # evaluations an iteration, at most
-TIGHT = 1e-15  # SciPy's own tolerances: when to stop is ours to say
+TIGHT = 1e-15  # SciPy's own tolerances, which must not stop it: `accept` does
 
 
 class Residuals:
@@ -30,17 +30,16 @@ class Residuals:
         self._last: Array | None = None
 
     def __call__(self, x: Array) -> Array:
-        """r; where J is not defined, those of the last step times WALL."""
+        """r; where J is not defined, the residuals of the last step times BEYOND."""
         try:
             p = self._p(x)
-            r = np.concatenate([self._seen(self.state(x), p), self._prior(p)[0]])
+            r = np.concatenate([self._data(self.state(x), p), self._prior(p)[0]])
         except OUTSIDE as error:
-            last = self.objective.accepted
-            assert last is not None
             if self._last is None:
                 raise
-            self.objective.tried.append(Evaluation(x, last.p, WALL * last.J, last.by_x, last.gradient, str(error)))
-            return WALL * self._last
+            last = self.objective.accepted
+            self.objective.tried.append(Evaluation(x, last.p, BEYOND * last.J, last.by_x, last.gradient, str(error)))
+            return BEYOND * self._last
         self._last = r if self._last is None else self._last
         return r
 
@@ -54,9 +53,7 @@ class Residuals:
         """dr/dx as a LinearOperator."""
         from scipy.sparse.linalg import LinearOperator
 
-        p, T = self._p(x), self.objective.variables.slope(x)
-        H = Sensitivity(self.objective.model, self.state(x), T)
-        B = self._prior(p)[1] * T
+        H, B = self._blocks(x)
         m = H.shape[0]
         return LinearOperator(
             (m + B.shape[0], len(x)),
@@ -66,30 +63,32 @@ class Residuals:
         )
 
     def dense(self, x: Array) -> Array:
-        """The same as an array."""
-        p, T = self._p(x), self.objective.variables.slope(x)
-        return np.concatenate(
-            [Sensitivity(self.objective.model, self.state(x), T).dense(), (self._prior(p)[1] * T).toarray()]
-        )
+        """dr/dx as an array."""
+        H, B = self._blocks(x)
+        return np.concatenate([H.dense(), B.toarray()])
 
     def evaluated(self, x: Array, derivative: Any) -> Evaluation:
         """J and its gradient by the chain rule, dJ/dx = (dr/dx)^T r."""
-        r = self(x)
-        self._last = r
+        r = self._last = self(x)
         by_x = np.asarray(derivative.T @ r)
         return Evaluation(x.copy(), self._p(x), 0.5 * float(r @ r), by_x, by_x / self.objective.variables.slope(x))
 
     def _p(self, x: Array) -> Array:
         return self.problem.parameters.check(self.objective.variables.p(x), self.problem.name)
 
-    def _seen(self, state: State, p: Array) -> Array:
+    def _blocks(self, x: Array) -> tuple[Sensitivity, Any]:
+        """d(S u)/dx and drho/dx."""
+        T = self.objective.variables.slope(x)
+        return Sensitivity(self.objective.model, self.state(x), T), self._prior(self._p(x))[1] * T
+
+    def _data(self, state: State, p: Array) -> Array:
         seen = self.problem.observation(state.u, p)
         if seen is None:
-            raise InputError(f"invert: {self.problem.name} is no sum of squares - take --optimizer lbfgs")
+            raise InputError(f"invert: {self.problem.name} is no sum of squares - use --optimizer lbfgs")
         return seen.predicted - seen.data
 
     def _prior(self, p: Array) -> tuple[Array, Any]:
-        """rho and drho/dp; none of either where nothing regularizes."""
+        """rho and drho/dp; both empty without regularization."""
         from scipy import sparse
 
         prior = self.problem.prior(p)
@@ -102,31 +101,29 @@ class Residuals:
 
 def gauss_newton(objective: Objective, history: History, limits: Limits) -> str:
     """Gauss-Newton in a trust region, each step by products with H (LSMR): SciPy's least_squares, trf."""
-    return _by_least_squares(
-        objective, history, limits, Residuals.derivative, method="trf", tr_solver="lsmr", tr_options=LSMR
-    )
+    lsmr = {"method": "trf", "tr_solver": "lsmr", "tr_options": LSMR}
+    return _by_least_squares(objective, history, limits, Residuals.derivative, lsmr)
 
 
 def levenberg_marquardt(objective: Objective, history: History, limits: Limits) -> str:
-    """Levenberg-Marquardt on the whole of H: MINPACK's, by SciPy. Raises InputError for fewer data than parameters."""
-    residuals = Residuals(objective)
-    m, n = len(residuals(start_of(objective))), len(start_of(objective))
+    """Levenberg-Marquardt with H as an array: MINPACK's, by SciPy. Raises InputError for fewer data than parameters."""
+    x = objective.accepted.x
+    m, n = len(Residuals(objective)(x)), len(x)
     if m < n:
         raise InputError(
-            f"invert: levenberg-marquardt with {m} data for {n} parameters - regularize by alpha=, or take gauss-newton"
+            f"invert: levenberg-marquardt with {m} data for {n} parameters - regularize by alpha=, or use gauss-newton"
         )
-    return _by_least_squares(objective, history, limits, Residuals.dense, method="lm")
+    return _by_least_squares(objective, history, limits, Residuals.dense, {"method": "lm"})
 
 
-def _by_least_squares(objective: Objective, history: History, limits: Limits, derivative: Any, **method: Any) -> str:
+def _by_least_squares(objective: Objective, history: History, limits: Limits, derivative: Any, method: Any) -> str:
     from scipy.optimize import least_squares
 
     residuals = Residuals(objective)
 
     def jac(x: Array) -> Any:
-        """Asked for where a step has been accepted."""
+        """Called where a step has been accepted."""
         by_x = derivative(residuals, x)
-        assert objective.accepted is not None
         if not np.array_equal(x, objective.accepted.x):
             objective.tried.append(residuals.evaluated(x, by_x))
             accept(objective, history, limits, x)
@@ -134,19 +131,14 @@ def _by_least_squares(objective: Objective, history: History, limits: Limits, de
                 raise Ended(spent(limits))
         return by_x
 
-    most = TRIALS * limits.iterations  # steps that come back are no iterations
+    most = TRIALS * limits.iterations  # rejected steps are not iterations
     tolerances: Any = {"xtol": TIGHT, "ftol": TIGHT, "gtol": TIGHT, "max_nfev": most}
-    try:
-        result: Any = least_squares(residuals, start_of(objective), jac=jac, **tolerances, **method)
-    except Ended as end:
-        return str(end)
+    result: Any = least_squares(residuals, objective.accepted.x.copy(), jac=jac, **tolerances, **method)
     return spent(limits) if result.status == 0 else explained(objective)
 
 
 def trust(objective: Objective, history: History, limits: Limits) -> str:
     """Newton-CG in a trust region (Steihaug 1983), SciPy's, with Gauss-Newton products and the route's gradient."""
-    from scipy.optimize import minimize
-
     residuals = Residuals(objective)
     known: dict[bytes, Any] = {}
 
@@ -157,13 +149,4 @@ def trust(objective: Objective, history: History, limits: Limits) -> str:
         A = known[x.tobytes()]
         return np.asarray(A.rmatvec(A.matvec(v))) / objective.J_0
 
-    def take(x: Array) -> None:
-        """SciPy tells of steps that it rejects, too: it has not moved then."""
-        assert objective.accepted is not None
-        if not np.array_equal(x, objective.accepted.x):
-            accept(objective, history, limits, x)
-
-    watch = Watching(take)
-    more: Any = {"callback": watch, "options": {"maxiter": limits.iterations, "gtol": 0.0}}
-    result: Any = minimize(objective, start_of(objective), jac=True, hessp=hessp, method="trust-ncg", **more)
-    return watch.end or (spent(limits) if result.status == 1 else explained(objective))
+    return minimized(objective, history, limits, {}, method="trust-ncg", hessp=hessp)

@@ -1,4 +1,4 @@
-"""Where u is affine in p, one linear least-squares solve is the answer: what a loop of gradients has to beat."""
+"""The minimum by one linear least-squares solve, where u is affine in p: what an iteration has to reach."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gradient_routes.bench.inversion.objective import Objective
 from gradient_routes.bench.inversion.variables import Variables
 from gradient_routes.problems.problem import Array, Problem
 
-ROUNDING = 1e-14  # LSMR's tolerances: the answer itself, not an estimate of it
+ROUNDING = 1e-14  # LSMR's tolerances
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class OneShot:
 
 
 def of_problem(problem: Problem, route: RouteSpec, engine: Engine, at: str) -> OneShot:
-    """The same from a point of the problem; raises what the first evaluation raises."""
+    """From a point of the problem. Raises what the first evaluation raises."""
     p = point(problem, at)
     variables = Variables.of(problem.parameters, p, "none", problem.name)
     objective = Objective(problem, route.route, route.options, engine.solver, variables)
@@ -45,11 +45,9 @@ def one_shot(objective: Objective) -> OneShot:
     """By LSMR (Fong & Saunders 2011), SciPy's, from the start of the objective; exact where Phi is quadratic."""
     from scipy.sparse.linalg import lsmr
 
-    assert objective.accepted is not None
     x, before = objective.accepted.x, objective.forward_solves
     residuals = Residuals(objective)
     r, A = residuals(x), residuals.derivative(x)
     step, _, iterations, *_ = lsmr(A, -r, atol=ROUNDING, btol=ROUNDING, conlim=0.0, maxiter=10 * len(x))
-    found = residuals(x + step)
-    p = objective.variables.p(x + step)
-    return OneShot(p, 0.5 * float(np.sum(found**2)), 2 * int(iterations), objective.forward_solves - before)
+    J = 0.5 * float(np.sum(residuals(x + step) ** 2))
+    return OneShot(objective.variables.p(x + step), J, 2 * int(iterations), objective.forward_solves - before)

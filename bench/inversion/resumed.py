@@ -14,8 +14,8 @@ from gradient_routes.problems.problem import Array
 
 
 def last_estimate(path: Path, spec: ProblemSpec, route: RouteSpec, optimizer: str, at: str) -> tuple[Array, int]:
-    """p (n_p,) at the end of the newest run of the same: problem, alpha, route, options, optimizer, start; and the
-    iterations behind it. Raises InputError where there is none.
+    """p (n_p,) at the end of the newest run of the same problem, route, options, optimizer and start, and its number
+    of iterations. Raises InputError where there is none.
     """
     store = Store(path)
     asked = {

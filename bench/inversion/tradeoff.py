@@ -1,4 +1,4 @@
-"""Bias and variance: what regularization takes from the truth, and what noise gives to the estimate."""
+"""Bias and variance of the estimate: the errors by regularization and by noise."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gradient_routes.routes.synthetic_data import CONVERGED
 
 @dataclass(frozen=True)
 class Trade:
-    """Mean squares over the parameters, of so many draws of the noise at one alpha: total = bias + variance."""
+    """Mean squares over the parameters, of several draws of the noise at one alpha: total = bias + variance."""
 
     inversion: Inversion
     draws: int
@@ -34,9 +34,9 @@ class Trade:
 def trade_off(
     spec: ProblemSpec, route: RouteSpec, engine: Engine, alphas: Sequence[float], draws: int, at: str = "start"
 ) -> Iterator[Trade]:
-    """J minimized for every draw of the noise at every alpha, the largest first.
+    """J minimized for every draw of the noise at every alpha, largest first.
 
-    Raises InputError, and KeyboardInterrupt where a draw was interrupted: the others at that alpha are no trade.
+    Raises InputError, and KeyboardInterrupt where a draw was interrupted, which leaves that alpha incomplete.
     """
     if not spec.options.get("noise"):
         raise InputError(f"invert: --draws {draws} of a problem without noise - write {spec.name}[noise=...]")
@@ -60,12 +60,12 @@ def _trade(found: Sequence[Inversion]) -> Trade:
 
 
 def drawn(spec: ProblemSpec, draws: int) -> list[Problem]:
-    """The problem with so many different noises on its data, the mesh and what is compiled shared where it can be."""
+    """The problem with several draws of noise on its data; mesh and compiled code are shared where possible."""
     seeds = range(int(spec.options.get("seed", 0)), int(spec.options.get("seed", 0)) + draws)
     bare: Problem = spec.build(**spec.options)
     twin, truth = bare.twin(), bare.truth()
     if truth is None:
-        raise InputError(f"invert: --draws {draws} of a problem whose truth is not known - take synthetic data")
+        raise InputError(f"invert: --draws {draws} of a problem whose truth is not known - use synthetic data")
     if twin is None:
         return [spec.build(**spec.options | {"seed": seed}) for seed in seeds]
     u = Model(twin, CONVERGED).solve(truth).u

@@ -1,4 +1,4 @@
-"""What an optimizer varies: x of size one, p = T(x) with the units of the problem, positive where asked for."""
+"""Optimization variables x of size one: p = T(x), with the units of the problem, positive on request."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters
 
 Positive = Literal["none", "log", "softplus"]
-DECADES = 3.0  # that natural changes of parameters may span before it is worth a warning
+DECADES = 3.0  # range of natural changes or of data above which the user is warned
 
 
 @dataclass(frozen=True)
 class Variables:
-    """p = s x, or p = s exp(x), or p = s log(1 + exp(x)), with s the natural changes of p at the start, (n_p,)."""
+    """p = s x, or p = s exp(x), or p = s log(1 + exp(x)), with s (n_p,) the natural changes of p at the start."""
 
     scale: Array
     positive: Positive = "none"
 
     @classmethod
     def of(cls, parameters: Parameters, p: Array, positive: Positive, who: str) -> Variables:
-        """Raises InputError where p cannot be made positive."""
-        if positive != "none" and not ((p > 0.0).all() and (np.broadcast_to(parameters.lower, p.shape) <= 0.0).all()):
+        """Raises InputError where p cannot be kept positive."""
+        if positive == "none":
+            return cls(parameters.scale)
+        if not ((p > 0.0).all() and (np.broadcast_to(parameters.lower, p.shape) <= 0.0).all()):
             raise InputError(
                 f"{who}: --positive {positive} with a start of {p.min():g} - it is for parameters > 0; a log field is"
                 " positive already"
             )
-        return cls(np.abs(p) if positive != "none" else parameters.scale, positive)
+        return cls(np.abs(p), positive)
 
     def p(self, x: Array) -> Array:
         if self.positive == "log":
             return np.asarray(self.scale * np.exp(x))
-        if self.positive == "softplus":
-            return np.asarray(self.scale * np.logaddexp(0.0, x))
-        return self.scale * x
+        return np.asarray(self.scale * (np.logaddexp(0.0, x) if self.positive == "softplus" else x))
 
     def x(self, p: Array) -> Array:
         q = p / self.scale
@@ -47,36 +47,34 @@ class Variables:
     def slope(self, x: Array) -> Array:
         """dp/dx, (n_p,)."""
         if self.positive == "log":
-            return np.asarray(self.scale * np.exp(x))
-        if self.positive == "softplus":
-            return self.scale * (0.5 * (1.0 + np.tanh(0.5 * x)))
-        return self.scale
+            return self.p(x)
+        return self.scale * (0.5 * (1.0 + np.tanh(0.5 * x))) if self.positive == "softplus" else self.scale
 
     @property
     def described(self) -> str:
-        """What x is in units of, in words."""
+        """The units of x, in words."""
         low, high = float(self.scale.min()), float(self.scale.max())
         size = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
-        how = {"none": "", "log": ", its logarithm varied", "softplus": ", softplus of what is varied"}[self.positive]
-        return f"p in units of {size}{how}"
+        how = {"none": "", "log": ", optimized in log p", "softplus": ", optimized in the argument of softplus"}
+        return f"p in units of {size}{how[self.positive]}"
 
     def warning(self, data: Array | None) -> str | None:
-        """What spans decades, and the remedy; None where all is near one."""
+        """What spans decades, and the remedy; None where all sizes are similar."""
         spanned = decades(self.scale)
         if spanned > DECADES:
             return (
                 f"natural changes of parameters span {spanned:.1f} decades: an optimizer sees the large ones only -"
-                " give Parameters a scale, or take a log parametrization"
+                " give Parameters a scale, or use a log parametrization"
             )
         if data is not None and decades(data) > DECADES:
             return (
-                f"data span {decades(data):.1f} decades: the small ones count for nothing in |S u - d|^2 - weigh them"
-                " by their noise"
+                f"data span {decades(data):.1f} decades: the small ones do not affect |S u - d|^2 - weight them by"
+                " their noise"
             )
         return None
 
 
 def decades(values: Array) -> float:
-    """Between the lower quartile of sizes that are not zero and the largest: a few small ones are nobody's fault."""
+    """From the lower quartile of the nonzero sizes to the largest, so that a few small ones do not count."""
     sizes = np.abs(values[values != 0.0])
     return float(np.log10(sizes.max() / np.quantile(sizes, 0.25))) if sizes.size else 0.0

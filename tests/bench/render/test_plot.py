@@ -69,6 +69,25 @@ def test_marks_that_meet_stand_side_by_side_while_there_is_room() -> None:
     assert lines(*twice)[9].count("e") == 1
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "row"),
+    [
+        ([5], [5], "     ab"),  # the second mark moves to the right,
+        ([5, 6], [5], "    baa"),  # to the left where the right is taken,
+        ([4, 5, 6], [5], "    a*a"),  # and both become one mark where neither is free
+        ([4, 5, 6], [6], "    aaab"),
+        ([5], [5, 5], "     ab"),  # points of one series share a mark
+        ([0], [0], "ab"),
+        ([35], [35], 34 * " " + "ba"),
+    ],
+)
+def test_a_mark_moves_by_fewer_columns_than_there_are_series(first: list[int], second: list[int], row: str) -> None:
+    x = [10.0 ** (k / 35) for k in range(36)]  # one decade on 36 columns
+    a = Series("a", [*(x[k] for k in first), 1.0, 10.0], [*(1.0 for _ in first), 10.0, 10.0], "a")
+    b = Series("b", [x[k] for k in second], [1.0 for _ in second], "b")
+    assert lines(a, b, width=40)[9] == f" 1 +{row}"
+
+
 def test_marks_are_those_of_routes_and_differ() -> None:
     assert marks(list(MARKS)) == list(MARKS.values())
     assert marks(["adjoint", "adjoint[factors=stale]", "adjoint[factors=fresh]"]) == ["A", "D", "J"]

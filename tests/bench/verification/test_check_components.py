@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from objectives import J, N, P, dJ, wrong
 
 from gradient_routes import check
+from gradient_routes.bench.verification.examine import Examination
+from gradient_routes.bench.verification.foreign import subject as foreign_subject
+from gradient_routes.bench.verification.guarded import Guarded
+from gradient_routes.bench.verification.locate import Search
+from gradient_routes.bench.verification.plan import Plan
+from gradient_routes.bench.verification.plateau import Level
+from gradient_routes.bench.verification.reading import Reading
 
 
 def test_a_right_gradient_of_a_thousand_parameters_costs_few_calls() -> None:
@@ -68,3 +77,31 @@ def test_a_smaller_budget_says_less_and_says_so() -> None:
     assert found.calls <= 50
     assert found.verdict == "wrong-gradient"
     assert any("budget of 50 calls is spent" in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "accepted", "by_nature", "margin"),
+    [(1e-3, 0.0, 0.0, 3e-3), (0.0, 1e-3, 0.0, 2e-3), (0.0, 0.0, 1e-3, 1e-3), (1e-4, 1e-3, 1e-3, 2e-3)],
+)
+def test_a_search_allows_what_noise_and_agreement_allow(
+    uncertainty: float, accepted: float, by_nature: float, margin: float
+) -> None:
+    """The largest of 3 uncertainties, the accepted error of a gradient of size 2, and its error by nature."""
+    subject = foreign_subject(lambda p: float(p.sum()), np.ones_like, np.ones(8))
+    seen = Examination.of(subject, Plan(), Guarded(subject.objective))
+    plateau = Reading(seen.read(seen.lines()[0], Plan().steps).quotients, 0.0, 2.0, accepted, by_nature)
+    vars(plateau)["level"] = Level(1.0, uncertainty, 1e-3, 1e-2)
+    for share, wrong_one in ((0.99, False), (1.01, True)):
+        search = Search(seen, plateau)
+        search.rng = SimpleNamespace(choice=lambda *_: np.ones(1), uniform=lambda *_: np.ones(1))
+        search.gradient[3] += share * margin
+        assert search.wrong(np.array([3])) is wrong_one
+        assert not search.wrong(np.array([2]))
+    assert not search.wrong(np.array([], dtype=int))
+
+
+def test_small_errors_that_are_accepted_are_not_searched_for() -> None:
+    p = np.linspace(0.2, 1.0, 64)
+    factors = np.where(np.arange(64) == 40, 2.0, 1.0 + 5e-5)
+    found = check(lambda p: float(np.sin(p).sum()), lambda p: factors * np.cos(p), p, accept=1e-3)
+    assert ([w.index for w in found.located.worst], found.located.right) == ([40], 63)

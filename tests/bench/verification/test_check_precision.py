@@ -24,6 +24,21 @@ def test_float32_is_judged_as_float32() -> None:
     assert check(J, lambda p: 1.001 * dJ(p).astype(np.float32), P).verdict != "agrees"
 
 
+@pytest.mark.parametrize("objective", [J, lambda p: np.float32(J(p))])
+@pytest.mark.parametrize("gradient", [dJ, lambda p: dJ(p).astype(np.float32)])
+def test_float32_gets_the_hint_to_use_float64(objective, gradient) -> None:
+    """Once, whichever side is float32, and not where neither is."""
+    hints = [r for r in check(objective, gradient, P).remarks if "jax.config.update('jax_enable_x64', True)" in r]
+    assert len(hints) == ((objective, gradient) != (J, dJ))
+    assert all("dtype=torch.float64" in hint for hint in hints)
+
+
+def test_a_float32_objective_that_hides_its_gradient_is_sent_to_float64() -> None:
+    found = check(lambda p: np.float32(1e4 + 1e-3 * sines(p)), lambda p: 1e-3 * np.cos(p), X)
+    assert found.verdict == "noise-limited"
+    assert "jax_enable_x64" in found.todo
+
+
 def test_float16_has_three_digits() -> None:
     assert check(sines, lambda p: np.cos(p).astype(np.float16), X).verdict == "agrees"
     assert check(sines, lambda p: (1.05 * np.cos(p)).astype(np.float16), X).verdict == "wrong-gradient"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gradient_routes import check
+from gradient_routes.bench.verification.table import rows
 from gradient_routes.problems.problem import Array
 
 
@@ -42,6 +43,16 @@ def test_a_zero_component_has_a_scale_that_is_said() -> None:
 
 
 def test_a_zero_gradient_is_right_where_nothing_changes_and_wrong_where_something_does() -> None:
-    assert check(lambda p: 5.0, lambda p: 0.0 * p, np.ones(3)).verdict == "agrees"
+    constant = check(lambda p: 5.0, lambda p: 0.0 * p, np.ones(3))
+    assert constant.verdict == "agrees"
+    assert any("J did not change at all" in remark for remark in constant.remarks)
     assert check(lambda p: 5.0 + 1e-6 * p[0], lambda p: 0.0 * p, np.ones(3)).verdict == "wrong-gradient"
     assert check(lambda p: 0.0, lambda p: 0.0 * p, np.ones(3)).verdict == "agrees"
+
+
+def test_a_line_without_calls_is_not_sampled() -> None:
+    found = check(lambda p: float(p @ p), lambda p: 2.0 * p, np.linspace(1.0, 2.0, 6), budget=64)
+    cells = {reading.name: cells[1] for reading, cells in rows(found)}
+    assert cells["random direction 1"] == "agrees"
+    assert cells["random direction 2"] == "not sampled"
+    assert not any("J did not change" in remark for remark in found.remarks)
