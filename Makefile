@@ -8,9 +8,10 @@ REPORTED := $(if $(wildcard results/routes.sqlite),results/routes.sqlite,results
 MATRIX := --problem bar --problem 'block[n=2]' --problem 'advection[n=4]' --route all --no-timing --jobs 2
 DEFAULT := --problem 'bar[n=8|100|1000|10000|100000|1000000]' --problem 'block[n=4|6|8]' --problem 'advection[n=8|16|32]'
 CHECKED := adjoint faulty-adjoint
+TESTED ?= tests/test_api.py tests/problems tests/routes
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline mutants reports reference clean
+.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline mutants reports reference docs clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -28,6 +29,9 @@ demo: $(READY) ## install into .venv, then all seven routes on the bar
 
 test: $(READY) ## install into .venv, then the tests
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+test-pythons: ## all routes on the bar, and some tests, on the oldest Python 3.11, 3.12 and 3.13 installed
+	python3 .ci/pythons.py $(TESTED)
 
 lint: $(READY) ## style: ruff
 	$(BIN)/ruff check .
@@ -83,6 +87,9 @@ reports: $(READY) ## everything in results/ as one page, results/report.html; of
 reference: $(READY) ## the small reference run that is committed, and its report, anew
 	$(BIN)/python -m benchmarks.reference_run
 
+docs: $(READY) ## the documentation as a site, docs/_build/index.html
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build
+
 clean: ## remove what was installed, built and cached; keep results/
-	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	rm -rf .venv .venvs build dist docs/_build docs/reference *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
 	find . -name __pycache__ -type d -exec rm -rf {} +

@@ -1,4 +1,4 @@
-"""Text for whoever reads: nothing of others that commands a terminal, and nothing to whom reads no more."""
+"""Output that is safe: no control characters of foreign text, no error for a closed pipe."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ CONTROLS = dict.fromkeys(code for code in (*range(32), *range(127, 160)) if chr(
 
 
 def plain(text: str) -> str:
-    """Without control characters, which could recolour a terminal, retitle it or overwrite what it shows."""
+    """The text without control characters, which could recolour or overwrite a terminal."""
     return text if text.isprintable() else text.translate(CONTROLS)
 
 
 def unread(stream: IO[str]) -> None:
-    """Its reader has gone: what is still printed goes nowhere, so that what was measured can be kept."""
+    """Discard further output of a stream whose reader has gone, so that results can still be stored."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

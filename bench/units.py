@@ -1,4 +1,4 @@
-"""Seconds, bytes and moments as a person reads them."""
+"""Durations, sizes and times as text."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import datetime
 
 
 def duration(seconds: float) -> str:
-    """Seconds as a person reads them."""
+    """Seconds in a unit that gives 1 to 1000: `46.7 us`."""
     for unit, length in (("y", 365.25 * 86400), ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0), ("ms", 1e-3)):
         if seconds >= length:
             return f"{seconds / length:.3g} {unit}"
@@ -14,7 +14,7 @@ def duration(seconds: float) -> str:
 
 
 def size(count: float) -> str:
-    """Bytes as a person reads them."""
+    """Bytes in a unit that gives 1 to 1000: `2.08 MiB`."""
     for unit in ("B", "KiB", "MiB", "GiB"):
         if count < 1000:
             return f"{count:.3g} {unit}"
@@ -23,5 +23,5 @@ def size(count: float) -> str:
 
 
 def now() -> str:
-    """UTC, ISO 8601, to the millisecond."""
+    """The time in UTC, ISO 8601 with milliseconds."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import environment
-from gradient_routes.bench.cases.row import Row, empty_row
+from gradient_routes.bench.cases.registry import study_tables
+from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import STUDIES
 from gradient_routes.routes.tally import KINDS
 
 ROUTES = (
@@ -34,7 +35,7 @@ def fill(store: Store, cases: int, studies: int = 1, seed: int = 0) -> None:
     for k in range(studies):
         problem = f"bar[n={8 * (k + 1)}]"
         for make in MAKERS:
-            made = {name: of for name, of in make(problem, 8 * (k + 1), rng).items() if name in STUDIES}
+            made = {name: of for name, of in make(problem, 8 * (k + 1), rng).items() if name in study_tables()}
             if made:
                 whole = {name: [whole_row(name, row) for row in of] for name, of in made.items()}
                 store.append_study(whole, WHEN)
@@ -43,7 +44,7 @@ def fill(store: Store, cases: int, studies: int = 1, seed: int = 0) -> None:
 
 def whole_row(table: str, row: Row) -> Row:
     """With every column, absent where nothing is said."""
-    return dict.fromkeys(column.name for column in STUDIES[table]) | row
+    return dict.fromkeys(column.name for column in study_tables()[table].columns) | row
 
 
 def case(k: int, rng: np.random.Generator) -> Row:

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import psutil
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.terminal.tables import console
 from gradient_routes.bench.store.store import Store
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gradient_routes.problems.problem import Array, Offers, Parameters, Problem
+from gradient_routes import Array, Offers, Parameters, Problem
 
 
 class Solver(Problem):

@@ -71,7 +71,7 @@ class Block(Problem):
         derivatives: Annotated[Literal["ad", "hand"], "P, dP/dF, dP/dq by JAX or hand-derived in NumPy"] = "ad",
         unknown: Annotated[UnknownName, "what p is"] = "modulus",
         parametrization: Annotated[Literal["log", "raw"] | None, "of moduli: p = log E or p = E [log]"] = None,
-        layers: Annotated[int, "layers along z, for unknown=layers"] = 4,
+        layers: Annotated[int | None, "along z, for unknown=layers [4, fewer on a coarse mesh]"] = None,
         surface: Annotated[str, "face whose nodes move, for unknown=shape"] = "right",
         load: Annotated[Load, "dead; a grip's; along the deformed normal"] = "traction",
         traction: Annotated[float, "on the loaded face, in z or along the normal [Pa]"] = 0.2,
@@ -224,7 +224,8 @@ class Block(Problem):
         if self._cells is None or unknown in ("traction", "shape"):
             return None
         nx, ny, nz = (2 * n for n in self._cells)
-        finer = Block(**self._given | {"n": 4, "nx": nx, "ny": ny, "nz": nz})
+        layers = len(p) if unknown == "layers" else None
+        finer = Block(**self._given | {"n": 4, "nx": nx, "ny": ny, "nz": nz, "layers": layers})
         if unknown != "modulus":
             return finer, p
         return finer, inherited(p, self.body.geometry.centres, finer.body.geometry.centres)

@@ -28,11 +28,16 @@ Structure = Literal["spd", "symmetric", "general"]
 
 
 class Offers(enum.Flag):
-    """What a problem offers and a route needs. SOLVE contains VALUE, LINEARIZE contains SOLVE."""
+    """What a problem offers and a route needs. SOLVE contains VALUE, LINEARIZE contains SOLVE.
+
+    Every bit has a name, STATE and PARTIALS included: Python 3.11.2 drops bits that have none.
+    """
 
     VALUE = 1
-    SOLVE = 2 | VALUE
-    LINEARIZE = 4 | SOLVE
+    STATE = 2
+    SOLVE = VALUE | STATE
+    PARTIALS = 4
+    LINEARIZE = SOLVE | PARTIALS
     TRACE = 8
     COMPLEX = 16
 

@@ -13,8 +13,8 @@ from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State, norm
 from gradient_routes.routes.route import ForwardWork, Work
-from gradient_routes.routes.solvers.factorization import Factorization, to_tolerance
 from gradient_routes.routes.solvers.krylov import conjugate_gradients, conjugate_residuals, products_to
+from gradient_routes.routes.solvers.solver import Factorization
 
 Factors = Annotated[
     Literal["refined", "fresh", "stale"],
@@ -36,13 +36,13 @@ class LinearizedSolver:
     def __init__(self, model: Model, state: State, factors: str, solves: int = 1) -> None:
         self.model, self.state = model, state
         self.rtol = model.solver.adjoint_rtol
-        self.A, self.R_u = to_tolerance(state.factors, self.rtol), None
+        self.A, self.R_u = state.factors.to(self.rtol), None
         if model.problem.linear or factors == "stale":
             return
         known = state.rate is not None and math.isfinite(state.rate)
         too_far = known and solves * products_to(state.rate or 0.0, 1.0, self.rtol) > WORTH
-        if factors == "fresh" or too_far or model.solver.linear_solver in ("krylov", "descent"):
-            self.A = to_tolerance(model.factors_at(state), self.rtol)
+        if factors == "fresh" or too_far or not model.solver.linear.factors:
+            self.A = model.factors_at(state).to(self.rtol)
         else:
             self.R_u = model.tangent_operator(state)
 

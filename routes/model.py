@@ -12,7 +12,8 @@ from gradient_routes.problems.problem import Array, Linearization, Offers, Param
 from gradient_routes.routes.load_stepping import by_load_steps
 from gradient_routes.routes.newton import Solver, State, Step, newton, norm
 from gradient_routes.routes.newton_steps import Chord, Direction, Doorways, Full, Inexact
-from gradient_routes.routes.solvers.factorization import Factorization, Factorizer
+from gradient_routes.routes.solvers.factorization import Factorizer
+from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.tally import Tally
 
 

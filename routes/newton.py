@@ -12,7 +12,8 @@ import numpy as np
 from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.newton_steps import Direction
-from gradient_routes.routes.solvers.factorization import Factorization, LinearSolver
+from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
+from gradient_routes.routes.solvers.solver import Factorization, LinearSolver
 from gradient_routes.routes.tally import Work
 
 STEP_LENGTHS = tuple(0.5**i for i in range(9))
@@ -28,8 +29,7 @@ Newton = Literal["full", "inexact"]
 class Solver:
     """When a forward solve is done: |R|_inf <= rtol |R(u_0)|_inf, or R is rounding; at most max_steps steps.
 
-    linear_solver  of sparse systems: pardiso, superlu, cg-amg, or the best direct one that is installed; of all:
-                   krylov and descent, iterations that end at the tolerance
+    linear_solver  the name of a registered LinearSolver; auto: the best direct one that is installed
     newton         full: R_u is factorized at every step; inexact: once, and again where that pays. A linear problem
                    takes one full step, complex p full ones: the imaginary part is not watched; and so do problems
                    without line search: that full steps converge is known of exact ones
@@ -39,10 +39,15 @@ class Solver:
 
     rtol: float = 1e-12
     max_steps: int = 50
-    linear_solver: LinearSolver = "auto"
+    linear_solver: str = DEFAULT
     newton: Newton = "full"
     adjoint_rtol: float = 1e-12
     polish: int = 0
+
+    @property
+    def linear(self) -> LinearSolver:
+        """The solver of that name. Raises InputError."""
+        return linear_solver(self.linear_solver)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from gradient_routes.problems.problem import Array
-from gradient_routes.routes.solvers.factorization import Factorization
 from gradient_routes.routes.solvers.krylov import conjugate_gradients, conjugate_residuals, products_to
+from gradient_routes.routes.solvers.solver import Factorization
 
 WORTH = 20.0  # products that cost what new factors cost, and the few that those need in their turn
 LOOSEST = 0.05  # forcing term |R - R_u du| / |R|

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,6 +87,19 @@ class Transposed:
         lam = H.R_u.solve_transposed(-np.asarray(H.seen.S_u.T @ w))
         by_p = H.R_p.T @ lam
         return np.asarray(H.scale * (by_p if H.seen.S_p is None else by_p + H.seen.S_p.T @ w))
+
+
+def state_sensitivity(model: Model, state: State, columns: Sequence[int] | None = None) -> Array:
+    """du/dp (n_u, k) at a solved state, R_u du/dp_i = -R_p e_i: of the parameters `columns`, all by default."""
+    R_p = model.linearize(state).R_p
+    R_u = LinearizedSolver(model, state, "fresh")
+    chosen = range(len(state.p)) if columns is None else columns
+    du_dp = np.empty((len(state.u), len(chosen)))
+    for k, i in enumerate(chosen):
+        e = np.zeros_like(state.p)
+        e[i] = 1.0
+        du_dp[:, k] = R_u.solve(-(R_p @ e))
+    return du_dp
 
 
 def units(n: int) -> Iterator[Array]:

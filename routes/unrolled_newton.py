@@ -8,7 +8,7 @@ import numpy as np
 
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.solvers.factorization import Factorization
+from gradient_routes.routes.solvers.solver import Factorization
 
 
 class Kept:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -99,6 +101,16 @@ def words(process: psutil.Process) -> list[str]:
 def ended(process: subprocess.Popen[str]) -> Ran:
     out, err = process.communicate(timeout=2 * PATIENCE)
     return Ran(process.returncode, out, err)
+
+
+@contextmanager
+def sigint_ignored() -> Iterator[None]:
+    """What is started within ignores SIGINT, as what shells start in the background does."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def eventually(holds: Callable[[], bool]) -> None:

@@ -11,7 +11,7 @@ from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.regression.measured import Case, Measured, Verdict
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import CHECKS
+from gradient_routes.bench.verification.columns import CHECKS
 from gradient_routes.routes.tally import KINDS
 
 MIB = 2**20

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import select
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -16,9 +18,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import ROOT, shell
+from commands import ROOT, shell, with_routes
 
 from gradient_routes.bench.cases.row import COLUMNS
+from gradient_routes.bench.commands.version import checked_out
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.bar import Bar
 from gradient_routes.routes.tally import KINDS
@@ -27,6 +30,9 @@ FIELDS = (
     "problem problem_options route route_options status reason n_state n_param objective gradient gradient_norm "
     "gradient_error reference prepare_s first_s seconds forward_s peak_bytes tape_bytes work predicted_work"
 ).split()
+HELP = """
+from gradient_routes.bench.cli import main
+main(["--help"], standalone_mode=False)"""
 QUICK = ("--min-time", "0")
 
 
@@ -67,7 +73,7 @@ def test_the_table_tells_the_bill(cli) -> None:
         "n_u",
         "n_p",
         "error",
-        "x fwd",
+        "cost / forward solve",
         "1 fwd + 8 lin",
         "1 fwd + 1 adj",
         "16 fwd",
@@ -77,6 +83,20 @@ def test_the_table_tells_the_bill(cli) -> None:
     ):
         assert words in out
     assert "3 of 8 elements lie behind the last sensor: blind" in out
+
+
+@pytest.mark.parametrize("verb", ["report", "status", "compare"])
+def test_tables_fit_80_columns(cli, monkeypatch: pytest.MonkeyPatch, verb: str) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    long = ("--route", "unrolled-ad[inner=jacobi,iterations=100]", "--route", "fd-central[start=chord]")
+    out = [run(cli, *long, problem="bar[n=8,sensors=1,3,5,7]", route="all").out]
+    store = "results/routes.sqlite"
+    out += [cli(verb, *([store, store] if verb == "compare" else [])).out]
+    for table in out:
+        rows = [line for line in table.splitlines() if ":" not in line and "; " not in line]
+        assert len(rows) > 3
+        assert max(map(len, rows)) <= 80
+    assert "1 fwd" in out[0]
 
 
 def test_gradient_view_shows_strains_and_the_blind(cli) -> None:
@@ -279,6 +299,48 @@ def test_help_names_every_verb(cli) -> None:
     for verb in ("list", "run", "export", "report"):
         assert verb in out
         assert cli(verb, "--help").code == 0
+
+
+def test_version_says_version_commit_and_python(cli, tmp_path: Path) -> None:
+    said = cli("--version").out
+    assert re.fullmatch(r"routes \d+\.\d+\S*( \(commit [0-9a-f]{7,}(-dirty)?\))?, Python 3\.\d+\.\d+\n", said)
+    assert ("commit" in said) == (ROOT / ".git").exists()
+    assert checked_out(tmp_path) is None
+    (tmp_path / ".git").mkdir()
+    assert checked_out(tmp_path) is None, "not a checkout that git can read"
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("run --problem ", {"bar", "block", "advection", "all"}),
+        ("run --problem bar --route f", {"fd-one-sided", "fd-central", "faulty-adjoint"}),
+        ("vcurve --problem b", {"bar", "block"}),
+        ("run --problem ./my_m", {"./my_m"}),
+    ],
+)
+def test_completion_offers_registered_names(words: str, offered: set[str], tmp_path: Path) -> None:
+    spaced = {"_ROUTES_COMPLETE": "bash_complete", "COMP_WORDS": f"routes {words}"}
+    done = shell("routes", tmp_path, **spaced, COMP_CWORD=str(len(words.split(" "))))
+    assert {line.partition(",")[2] for line in done.stdout.splitlines()} >= offered
+    assert (done.stderr, "numpy" in done.stdout) == ("", False)
+
+
+@pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
+def test_completion_scripts_name_the_program(name: str, tmp_path: Path) -> None:
+    if name == "bash" and shutil.which("bash") is None:
+        pytest.skip("bash is not installed")
+    assert "_ROUTES_COMPLETE" in shell("routes", tmp_path, _ROUTES_COMPLETE=f"{name}_source").stdout
+
+
+@pytest.mark.parametrize(("code", "light"), [("import gradient_routes", "click"), (HELP, "numpy")])
+def test_the_first_commands_import_little(code: str, light: str) -> None:
+    """Seconds are of the machine; what costs them is what is imported."""
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport sys; print('\\n'.join(sys.modules))"],
+        env=with_routes(), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert not {light, "numpy", "rich", "ctypes", "sqlite3", "importlib.metadata"} & set(done.stdout.splitlines())
 
 
 def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the documents say is what the code does: every block of README and CONTRIBUTING is executed."""
+"""The documents say what the code does: every block of README, CONTRIBUTING and docs/ is executed."""
 
 from __future__ import annotations
 
@@ -10,15 +10,20 @@ from pathlib import Path
 import pytest
 from commands import ROOT, Ran, shell
 
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [str(p.relative_to(ROOT)) for p in PAGES if not {"reference", "_build"} & set(p.parts)]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILE = re.compile(r"# (\w+\.py)\n")  # the first line of a Python block that is a file of the reader's
 QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 NUMBER = re.compile(r"(?<![\w.=\[-])<?[-+]?\d[\d.]*(e[-+]?\d+)?( (B|KiB|MiB|GiB|us|ms|s|min|h|d|y)\b)?")
 
 
 def blocks(document: str, language: str) -> list[str]:
-    found = [body for kind, body in BLOCK.findall((ROOT / document).read_text()) if kind == language]
-    assert found, f"{document} has no {language} block: nothing would be tested"
-    return found
+    return [body for kind, body in BLOCK.findall((ROOT / document).read_text()) if kind == language]
+
+
+def having(language: str) -> list[str]:
+    return [document for document in DOCUMENTS if blocks(document, language)]
 
 
 def shape(text: str) -> list[list[str]]:
@@ -27,81 +32,92 @@ def shape(text: str) -> list[list[str]]:
     return [NUMBER.sub("#", line).split() for line in text.splitlines() if line.strip()]
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    return tmp_path
+def reader(document: str, folder: Path) -> Path:
+    """The folder of someone who follows a document: the examples, and the files it has them write."""
+    shutil.copytree(ROOT / "examples", folder / "examples", dirs_exist_ok=True)
+    for block in blocks(document, "python"):
+        if named := FILE.match(block):
+            (folder / named[1]).write_text(block)
+    return folder
 
 
 def typed(cli, folder: Path, command: str) -> Ran:
     """A command in this process, which has JAX imported and shares what is compiled; in a shell's where that has a
     word in it, and where other processes run the cases.
     """
-    if set("[]{}()|&;<>*?$`~!") & set(QUOTED.sub("", command)) or "--executor" in command:
+    special = set("[]{}()|&;<>*?$`~!") & set(QUOTED.sub("", command))
+    if special or "--executor" in command or not command.startswith("routes "):
         done = shell(command, folder)
         return Ran(done.returncode, done.stdout, done.stderr)
-    program, *arguments = shlex.split(command)
-    assert program == "routes"
-    return cli(*arguments)
+    return cli(*shlex.split(command)[1:])
 
 
-@pytest.mark.parametrize("block", blocks("README.md", "console"), ids=lambda block: block.splitlines()[0][2:40])
-def test_the_tour_prints_what_the_readme_shows(block: str, folder: Path, cli) -> None:
+def consoles() -> list[tuple[str, str]]:
+    """Document and block; a block that several documents show is run once."""
+    found = {block: document for document in reversed(DOCUMENTS) for block in blocks(document, "console")}
+    assert len(found) > 15, "hardly any console block: the pattern no longer finds them"
+    return [(document, block) for block, document in found.items()]
+
+
+@pytest.mark.parametrize(("document", "block"), consoles(), ids=lambda text: text.splitlines()[0][:40])
+def test_commands_print_what_is_shown(document: str, block: str, tmp_path: Path, cli) -> None:
     command, _, shown = block.removeprefix("$ ").partition("\n")
-    ran = typed(cli, folder, command)
+    ran = typed(cli, reader(document, tmp_path), command)
     assert (ran.code, ran.err) == (0, "")
-    out = ran.out
-    assert shape(out) == shape(shown)
+    assert shape(ran.out) == shape(shown)
     if command.startswith("routes check"):
-        (calls,) = re.findall(r"(\d+) objective calls", out)
+        (calls,) = re.findall(r"(\d+) objective calls", ran.out)
         assert int(calls) <= 200
-        (code,) = re.findall(r"exit code (\d)", out)
+        (code,) = re.findall(r"exit code (\d)", ran.out)
         assert f"exit code {code}" in shown  # a number, which the shape leaves out
 
 
-def test_the_other_commands_of_the_readme_run(folder: Path, cli) -> None:
-    for block in blocks("README.md", "sh"):
-        for command in block.replace("\\\n", " ").splitlines():
+@pytest.mark.parametrize("document", having("sh"))
+def test_the_other_commands_run(document: str, tmp_path: Path, cli) -> None:
+    folder = reader(document, tmp_path)
+    for block in blocks(document, "sh"):
+        for line in block.replace("\\\n", " ").splitlines():
+            command, _, writes = (part.strip() for part in line.partition("  # writes "))
             ran = typed(cli, folder, command.partition("  #")[0].strip())
             assert (ran.code, ran.err) == (0, ""), command
+            assert not writes or (folder / writes).stat().st_size > 0
             for row in ran.rows if "--json" in command else ():
                 assert row.get("calls", 0) <= 200
-    assert (folder / "results/cases.csv").stat().st_size > 0 < (folder / "results/samples.parquet").stat().st_size
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])
-def test_python_blocks_run_one_after_the_other(document: str) -> None:
+@pytest.mark.parametrize("document", having("python"))
+def test_python_blocks_run_one_after_the_other(document: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(reader(document, tmp_path))
     space: dict = {}
     for block in blocks(document, "python"):
         exec(compile(block, document, "exec"), space)
 
 
-def test_the_two_commands_exist_and_do_what_the_readme_says(folder: Path) -> None:
-    (first,) = [b for b in blocks("README.md", "") if "make demo" in b]
-    for line in first.splitlines():
-        target = line.split()[1]
-        dry = shell(f"make --dry-run --always-make {target}", ROOT)
-        assert dry.returncode == 0, dry.stderr
-        for step in (
-            "-m venv .venv",
-            "pip install",
-            "routes run --problem bar --route all" if target == "demo" else "pytest",
-        ):
-            assert step in dry.stdout
+@pytest.mark.parametrize("target", ["demo", "test"])
+def test_the_two_commands_exist_and_do_what_the_readme_says(target: str) -> None:
+    assert any(re.search(rf"^make {target} ", block, re.MULTILINE) for block in blocks("README.md", ""))
+    dry = shell(f"make --dry-run --always-make {target}", ROOT)
+    assert dry.returncode == 0, dry.stderr
+    last = "routes run --problem bar --route all" if target == "demo" else "pytest"
+    assert all(step in dry.stdout for step in ("-m venv .venv", "pip install", last))
 
 
 def test_make_lists_its_targets() -> None:
     listed = shell("make", ROOT).stdout
     gates = "gate baseline benchmark-regression benchmark-baseline"
-    for target in f"help demo test lint type {gates} benchmark mutants reports reference clean".split():
+    for target in f"help demo test lint type {gates} benchmark mutants reports reference docs clean".split():
         assert re.search(rf"^{target} ", listed, re.MULTILINE), target
 
 
-def test_no_document_points_nowhere() -> None:
-    for document in ("README.md", "CONTRIBUTING.md"):
-        text = (ROOT / document).read_text()
-        paths = re.findall(r"\]\(([^)#:]+)\)", text) + re.findall(
-            r"`((?:bench|routes|problems|tests|examples)/[\w./]+)`", text
-        )
-        assert paths
-        assert not [path for path in paths if not (ROOT / path).exists()]
+def test_the_readme_is_one_page() -> None:
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 250
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_no_document_points_nowhere(document: str) -> None:
+    text = (ROOT / document).read_text()
+    linked = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text)
+    here = [path for path in linked if "reference/" not in path]  # generated: `make docs` follows those
+    top = re.findall(r"`((?:bench|routes|problems|tests|examples|benchmarks|docs|findings)/[\w./]+)`", text)
+    missing = [p for p in here if not (ROOT / document).parent.joinpath(p).exists()]
+    assert not missing + [p for p in top if "NAME" not in p and not (ROOT / p).exists()]

@@ -1,4 +1,4 @@
-"""A third party's problem and route, installed by pip, found by entry point; a broken one says why."""
+"""A third party's problem, route and linear solver, installed by pip, found by entry point; a broken one says why."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(
         "[gradient_routes.problems]\nsunk = sunk.problem:Sunk\n[gradient_routes.routes]\nnone = math:pi\n"
+        "[gradient_routes.solvers]\nlost = lost.solver:lost\nnumber = math:pi\n"
     )
     return site
 
@@ -65,6 +66,36 @@ def test_a_broken_plugin_is_one_line(site: Path, tmp_path: Path) -> None:
     done = routes(site, "run --problem sunk --route adjoint", tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("routes: problem 'sunk' of broken cannot be imported")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_linear_solver_is_one_file_and_one_entry_point(site: Path, tmp_path: Path) -> None:
+    done = routes(
+        site,
+        "run --json --problem duffing --route adjoint --route complex-step --linear-solver dense-cholesky --min-time 0",
+        tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    adjoint, complex_step = map(json.loads, done.stdout.splitlines())
+    assert adjoint["linear_solver"] == "LAPACK L L^T"
+    assert adjoint["work"] == adjoint["predicted_work"]
+    assert adjoint["gradient_error"] < 1e-12 > complex_step["gradient_error"]  # complex matrices: by LAPACK L U
+    assert "auto|cg-amg|descent|krylov|pardiso|superlu|dense-cholesky|lost|number" in "".join(
+        routes(site, "run --linear-solver no-such", tmp_path).stderr.split()
+    ).replace("'", "").replace(",", "|")
+
+
+@pytest.mark.parametrize(
+    ("solver", "says"),
+    [
+        ("lost", "routes: linear solver 'lost' of broken cannot be imported: ModuleNotFoundError: No module named"),
+        ("number", "routes: linear solver 'number' of broken is no LinearSolver of that name - correct broken"),
+    ],
+)
+def test_a_broken_linear_solver_is_one_line(site: Path, tmp_path: Path, solver: str, says: str) -> None:
+    done = routes(site, f"run --problem bar --route adjoint --linear-solver {solver}", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(says)
     assert done.stderr.count("\n") == 1
 
 

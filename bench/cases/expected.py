@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from gradient_routes.bench.cases.row import STATUSES, Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.row import STATUSES
 from gradient_routes.bench.cases.selector import Selector, parse
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.problems.errors import InputError

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import versions
-from gradient_routes.bench.cases.row import Row, clean
+from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.sources import Stamp, digest, stamp, stamps
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import traceback
 from dataclasses import dataclass
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.samples import Samples
-from gradient_routes.problems.errors import DomainError, InputError, NotConverged, RoutesError
+from gradient_routes.bench.cases.status import Status, one_line, reason_of, status_of
+from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 from gradient_routes.problems.problem import Array, Fields, ParameterView, Reference
-
-FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
-EXHAUSTED = ("RESOURCE_EXHAUSTED", "out of memory", "not enough memory")  # what XLA and PARDISO say for MemoryError
 
 
 @dataclass(frozen=True)
@@ -29,33 +27,37 @@ class View:
 
 
 @dataclass(frozen=True)
+class Sensitivities:
+    """du/dp or d(S u)/dp, `values` (rows, k), of the parameters named, and what a row is of."""
+
+    name: str
+    rows: list[str]
+    parameters: list[str]
+    units: list[str]
+    values: Array
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """A row and its raw timings, what --gradient and --vtu show, the environment of its process, the bad input, if that
-    is why it failed, and the place of the case in its sweep: outcomes come as they can.
+    """A row and its raw timings, what --gradient, --vtu and --sensitivities show, the environment of its process, the
+    bad input, if that is why it failed, and the place of the case in its sweep: outcomes come as they can.
     """
 
     row: Row
     samples: Samples | None = None
     view: View | None = None
     fields: Fields | None = None
+    sensitivities: Sensitivities | None = None
     environment: Environment | None = None
     refusal: RoutesError | None = None
     place: int = 0
-
-
-class Failure(RoutesError):
-    """A case that cannot give a number that deserves the name."""
-
-
-class NonFinite(Failure):
-    """A number that is none: NaN or infinity."""
 
 
 def failed(row: Row, who: str, failure: BaseException) -> Row:
     """The row of a case that raised `failure`: its status, the reason in a sentence, the traceback."""
     return row | {
         "status": status_of(failure),
-        "reason": str(failure) if isinstance(failure, RoutesError) else f"{who}: {one_line(failure)} - see --debug",
+        "reason": reason_of(failure, who),
         "traceback": "".join(traceback.format_exception(failure)),
     }
 
@@ -71,22 +73,12 @@ def unbuilt(row: Row, problem: str, failure: BaseException) -> Outcome:
 def outdated(row: Row, file: str) -> Row:
     """The row of a case whose code or data have changed while it ran."""
     reason = f"{row['route']}: {file} has changed since the run began - run it again"
-    return row | {"status": "failed", "reason": reason}
+    return row | {"status": Status.FAILED, "reason": reason}
 
 
 def refused(row: Row, refusal: RoutesError) -> Outcome:
     """The outcome of a case whose problem does not take what it was given."""
-    return Outcome(row | {"status": "failed", "reason": str(refusal)}, refusal=refusal)
-
-
-def status_of(failure: BaseException) -> str:
-    """As in bench.cases.row.STATUSES."""
-    said = f"{failure} {failure.__cause__ or ''}"
-    if isinstance(failure, MemoryError) or any(words in said for words in EXHAUSTED):
-        return "out-of-memory"
-    if isinstance(failure, NotConverged):
-        return "not-converged"
-    return "non-finite" if isinstance(failure, NonFinite) else "failed"
+    return Outcome(row | {"status": Status.FAILED, "reason": str(refusal)}, refusal=refusal)
 
 
 def note(row: Row, what: str) -> None:
@@ -98,8 +90,3 @@ def bare(error: InputError | DomainError) -> InputError | DomainError:
     """Without what a subclass of others adds: that might not be put together again in another process."""
     kind = DomainError if isinstance(error, DomainError) else InputError
     return kind(str(error))
-
-
-def one_line(error: BaseException) -> str:
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__

@@ -1,4 +1,4 @@
-"""What exists: problems and routes, built-in and from plug-ins, all by entry points, loaded when asked for."""
+"""What exists: problems, routes and studies, built-in and from plug-ins, all by entry points, loaded when asked for."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Literal
 
+from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.imported import imported, is_reference
+from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.route import Route
 
-Kind = Literal["problem", "route"]
+Kind = Literal["problem", "route", "study"]
+GROUPS = {"problem": "gradient_routes.problems", "route": "gradient_routes.routes", "study": "gradient_routes.studies"}
 BUILT_IN = "gradient-routes"
 
 
@@ -62,6 +65,8 @@ class Entry:
             raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
         if self.kind == "problem" and not callable(target):
             raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
+        if self.kind == "study" and not (isinstance(target, Study) and target.name == self.name):
+            raise InputError(f"study '{self.name}' of {self.origin} is no Study of that name - register one")
         return target
 
     @property
@@ -81,7 +86,7 @@ class Entry:
 @cache
 def registered(kind: Kind) -> list[Entry]:
     """All entries of a kind, built-ins first."""
-    found = [Entry(kind, point) for point in entry_points(group=f"gradient_routes.{kind}s")]
+    found = [Entry(kind, point) for point in entry_points(group=GROUPS[kind])]
     return sorted(found, key=lambda e: (e.origin != BUILT_IN, *place(e.name)))
 
 
@@ -99,6 +104,17 @@ def entries(kind: Kind) -> dict[str, Entry]:
     return first
 
 
+@cache
+def studies() -> dict[str, Study]:
+    """All that can be imported, by name."""
+    return {name: entry.load() for name, entry in entries("study").items() if entry.failure is None}
+
+
+def study_tables() -> dict[str, Table]:
+    """The tables of all studies, by name."""
+    return {name: table for study in studies().values() for name, table in study.tables.items()}
+
+
 # the order of the story: from nothing but J to the whole structure
 ORDER = (
     "bar",
@@ -112,6 +128,15 @@ ORDER = (
     "unrolled-ad",
     "implicit-ad",
     "faulty-adjoint",
+    "run",
+    "scaling",
+    "vcurve",
+    "check",
+    "tolerance",
+    "unrolling",
+    "kink",
+    "invert",
+    "identify",
 )
 
 

@@ -4,31 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gradient_routes.bench.cases.column import Column, Row
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.routes.tally import KINDS
 
-Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of the table `cases`. `type` is SQLite's; JSON columns hold text there and objects in --json."""
-
-    name: str
-    type: str
-    unit: str
-    meaning: str
-    json: bool = False
-
-
 # settled by an answer; by a limit of the case or of the machine; by an error in what was run
-ANSWERED = ("ok", "skipped", "pruned")
-LIMITED = ("timeout", "out-of-memory")
-WRONG = ("not-converged", "non-finite", "failed", "crashed")
+ANSWERED = (Status.OK, Status.SKIPPED, Status.PRUNED)
+LIMITED = (Status.TIMEOUT, Status.OUT_OF_MEMORY)
+WRONG = (Status.NOT_CONVERGED, Status.NON_FINITE, Status.FAILED, Status.CRASHED)
 STATUSES = (*ANSWERED, *LIMITED, *WRONG)
 
 COLUMNS = (

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import itertools
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -76,8 +77,8 @@ def closure(path: Path, root: Path, top: str | None) -> set[Path]:
         if file in found:
             continue
         found.add(file)
-        for name in imported_names(file, root if file.is_relative_to(root) else HERE):
-            name = defined_in(name)
+        names = imported_names(file, root if file.is_relative_to(root) else HERE)
+        for name in itertools.chain(*map(defined_in, names)):
             if name.startswith(OURS):
                 waiting += located(name, HERE)
             elif top is None or (name.partition(".")[0] == top != gradient_routes.__name__):
@@ -86,7 +87,9 @@ def closure(path: Path, root: Path, top: str | None) -> set[Path]:
 
 
 def imported_names(file: Path, root: Path) -> Iterator[str]:
-    """Dotted names that a file imports anywhere, relative ones resolved; of `from a import b` both a and a.b."""
+    """Dotted names that a file imports anywhere, relative ones resolved; of `from a import b` both a and a.b, of
+    `import a` and `from a import *` also a.*.
+    """
     try:
         tree = ast.parse(file.read_bytes())
     except (SyntaxError, ValueError):  # it will say so itself when it is imported
@@ -94,7 +97,7 @@ def imported_names(file: Path, root: Path) -> Iterator[str]:
     package = file.parent.relative_to(root).parts if file.is_relative_to(root) else ()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            yield from (name for alias in node.names for name in (alias.name, f"{alias.name}.*"))
         elif isinstance(node, ast.ImportFrom):
             above = package[: len(package) - node.level + 1] if node.level else ()
             base = ".".join([*above, *([node.module] if node.module else [])])
@@ -102,10 +105,12 @@ def imported_names(file: Path, root: Path) -> Iterator[str]:
             yield from (f"{base}.{alias.name}".lstrip(".") for alias in node.names)
 
 
-def defined_in(name: str) -> str:
-    """The module of a public name of this package, `gradient_routes.Problem` say; other names as they are."""
+def defined_in(name: str) -> Iterable[str]:
+    """The modules of public names of this package, `gradient_routes.Problem` say; other names as they are."""
     package, _, public = name.partition(".")
-    return gradient_routes.PUBLIC.get(public, name) if package == gradient_routes.__name__ else name
+    if package != gradient_routes.__name__:
+        return [name]
+    return gradient_routes.PUBLIC.values() if public == "*" else [gradient_routes.PUBLIC.get(public, name)]
 
 
 def located(name: str, root: Path) -> list[Path]:

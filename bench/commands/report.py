@@ -27,6 +27,8 @@ MORE = "routes report -o report.html: figures, curves and all studies, as one pa
 def report(output: Path | None, format: str | None, figures: Path | None, store: Path) -> None:
     """Everything the store holds: the bill, curves and verdicts, studies, failures.
 
+    Problems are shown in the order in which they were first run, routes in the order of `routes list`.
+
     \b
     routes report                                     tables in the terminal
     routes report -o report.html                      one page that needs no server and no network
@@ -48,8 +50,9 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
 
 
 def _print(store: Store) -> None:
+    from gradient_routes.bench.cases.order import in_order
     from gradient_routes.bench.render.terminal.tables import console
-    from gradient_routes.bench.studies.bill.command import show
+    from gradient_routes.bench.studies.bill.view import show
 
-    show(store.rows())
+    show(in_order(store.rows(), lambda row: row))
     console().print(MORE, style="dim", soft_wrap=True)

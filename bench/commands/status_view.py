@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.row import ANSWERED
-from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.tables import asked
+from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.bench.store.status import Standing, counts
 
 
-def matrix(standing: list[Standing]) -> Table:
+def matrix(standing: list[Standing]) -> TextTable:
     """A line a problem with its settings, a column a route; several options of one route share a cell."""
     cells: dict[str, dict[str, list[Standing]]] = {}
     for each in standing:
         cells.setdefault(asked(each.row), {}).setdefault(each.row["route"], []).append(each)
     routes = sorted({each.row["route"] for each in standing}, key=registry.place)
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("problem", overflow="fold", min_width=14)
-    for route in routes:
-        table.add_column(Text(route, style=route_style(route)), overflow="fold")
+    table = TextTable(["problem", *routes])
     for problem, found in cells.items():
-        table.add_row(Text(problem), *(_cell(found.get(route, [])) for route in routes))
+        table.row(Text(problem), [_cell(found.get(route, [])) for route in routes])
     return table
 
 

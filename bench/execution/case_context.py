@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, point
-from gradient_routes.bench.cases.outcome import View
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.outcome import Sensitivities, View
 from gradient_routes.bench.cases.partial import Partial
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
 from gradient_routes.bench.execution.references import Found, Judge, Judges
+from gradient_routes.bench.execution.sensitivities import check_columns, sensitivities, with_columns
 from gradient_routes.bench.execution.timing import seconds_of
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Fields, Offers, ParameterView, Problem
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import State
+from gradient_routes.routes.newton import Solver, State
 from gradient_routes.routes.route import Options, Result, Route
 
 
@@ -37,9 +38,12 @@ class Workbench:
         self.n_p = len(self.p)
         if settings.fields and type(self.problem).fields is Problem.fields:
             raise InputError(f"{self.problem.name}: has no mesh to write fields on - drop --vtu")
+        if settings.columns is not None:
+            check_columns(settings.columns, self.problem.name, self.n_p)
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
-        direct = replace(settings.solver, linear_solver="auto", newton="full")  # a judge is no fellow of the judged
+        # references are independent of the solver that is examined
+        direct = replace(settings.solver, linear_solver=Solver.linear_solver, newton=Solver.newton)
         self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_judge, found)
         self._forward_model = self.model()
         self._priced: tuple[Prices, State | None] | Exception | None = None
@@ -109,7 +113,18 @@ class Workbench:
         u = self._state_of(result)
         if u is None or not self.settings.fields:
             return None
-        return self.problem.fields(self.p, u, result.lam, np.asarray(result.gradient))
+        gradient, columns = np.asarray(result.gradient), self.settings.columns
+        fields = self.problem.fields(self.p, u, result.lam, gradient)
+        if fields is None or columns is None or not columns.on_mesh:
+            return fields
+        return with_columns(fields, self.problem, self.price()[1], self._forward_model, columns)
+
+    def sensitivities(self) -> Sensitivities | None:
+        """The columns asked for; None for a black box."""
+        state, columns = self.price()[1], self.settings.columns
+        if state is None or columns is None or not columns.table:
+            return None
+        return sensitivities(self._forward_model, state, columns)
 
     def _state_of(self, result: Result) -> Array | None:
         """u of the route, or of the forward solve that set the prices; None for a black box."""

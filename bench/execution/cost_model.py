@@ -1,4 +1,4 @@
-"""What a route will cost before it is run: its declared work priced by one measured forward solve."""
+"""Predicted cost of a route: its declared work times the measured time of a forward solve, a solve and a product."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 from gradient_routes.routes.tally import Work
 
-SHORT, LONG = 1.0, 10.0  # [s] the first call of anything is slow (compilation): 3 more are timed, 1 more, or none
+SHORT, LONG = 1.0, 10.0  # [s] a first call includes compilation: 3 more calls are timed, beyond SHORT 1, LONG none
 
 
 @dataclass(frozen=True)
 class Prices:
-    """Seconds of a forward solve, of a substitution with its factors, of a product with R_u; and its declared work."""
+    """Seconds of a forward solve, of a substitution with its factors and of a product with R_u; its declared work."""
 
     forward: float
     solve: float
@@ -29,9 +29,9 @@ class Prices:
     declared: ForwardWork
 
     def seconds(self, work: Work) -> float:
-        """The bill: cold forward solves' worth of factorizations, and what substitutions and products are left over.
+        """Predicted seconds: factorizations as cold forward solves, plus the remaining substitutions and products.
 
-        A residual costs what a product does. Chord steps on factors at hand are so no forward solves.
+        A residual is taken to cost as much as a product. Chord steps reuse factors and count as substitutions.
         """
         cold = self.declared.cold
         times = work.factorizations / cold.factorizations if cold.factorizations else work.forward_solves
@@ -41,7 +41,7 @@ class Prices:
 
 
 def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
-    """Measure the prices at p, and give back the state solved on the way (None for a black box)."""
+    """Measure the prices at p; also return the state solved for them (None for a black box)."""
     problem = model.problem
     if Offers.SOLVE not in problem.offers:
         seconds, _ = price_of(lambda: model.value(p))
@@ -57,14 +57,14 @@ def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
 
 
 def price_of(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Median seconds of a call after a first one, where that is not too long, and what it returned."""
+    """Median seconds of the calls after the first one, unless that is too long, and the result."""
     first, result = seconds_of(call)
     repeats = 3 if first < SHORT else 1 if first < LONG else 0
     return median([seconds_of(call)[0] for _ in range(repeats)] or [first]), result
 
 
 def unaffordable(seconds: float, tape: float | None, work: Work, budget: float) -> str | None:
-    """Why a predicted bill is not paid, in a sentence; None if it is."""
+    """Why a route is skipped for its predicted cost, in a sentence; None if it is not."""
     if seconds > budget:
         return f"predicted bill {duration(seconds)} ({summary(work)}) > --budget {budget:g} s; --budget inf forces it"
     memory = available_bytes()
@@ -77,7 +77,7 @@ LEGEND = "fwd forward solves, lin linearized solves, adj transposed solves, mv p
 
 
 def summary(work: Work) -> str:
-    """The work a person compares, in the words of LEGEND."""
+    """The work in the abbreviations of LEGEND."""
     substitutions = work.solves - work.newton_iterations
     parts = (
         (work.forward_solves, "fwd"),

@@ -12,17 +12,20 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import environment
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
-from gradient_routes.bench.cases.outcome import FOREIGN, Failure, NonFinite, Outcome, failed, note
-from gradient_routes.bench.cases.row import Row, empty_row
+from gradient_routes.bench.cases.outcome import Outcome, failed, note
+from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite
 from gradient_routes.bench.execution.case_context import Workbench
 from gradient_routes.bench.execution.cost_model import summary
+from gradient_routes.bench.execution.isolation.channel import Channel
+from gradient_routes.bench.execution.isolation.messages import Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Judge, norm2
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
-from gradient_routes.bench.execution.worker import Channel
 from gradient_routes.bench.units import duration, now
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
@@ -115,12 +118,12 @@ class Measurement:
 
     def in_turns(self, channel: Channel) -> Outcome:
         """Timed when told to."""
-        channel.say("ready", (self.long, self.bench.judges.found))
-        kind, interleaved = channel.hear()
-        while kind == "turn":
-            channel.say("turned", self.turn())
-            kind, interleaved = channel.hear()
-        return self.outcome(interleaved)
+        channel.say(Ready(self.long, self.bench.judges.found))
+        order = channel.hear()
+        while isinstance(order, Turn):
+            channel.say(Turned(self.turn()))
+            order = channel.hear()
+        return self.outcome(order.interleaved)
 
     def outcome(self, interleaved: int) -> Outcome:
         """The row with its timings, taken beside those of so many cases."""
@@ -142,7 +145,8 @@ class Measurement:
             }
         with undisturbed():
             view, fields = self.bench.view(self.route, self.result), self.bench.fields(self.result)
-        return Outcome(self.row | {"status": "ok"}, samples, view, fields, environment())
+            columns = self.bench.sensitivities()
+        return Outcome(self.row | {"status": "ok"}, samples, view, fields, columns, environment())
 
 
 @contextmanager
@@ -174,10 +178,7 @@ def _check(bench: Workbench, route: Route, result: Result, row: Row) -> None:
     if bad.size:
         first = f"{bench.problem.parameters.label(int(bad[0]))} = {g[bad[0]]}"
         raise NonFinite(f"{route.name}: {bad.size} of {g.size} gradient components not finite, first {first} - check p")
-    J = result.J
-    if J is None:
-        J = bench.objective()
-        note(row, f"{route.name}: objective from 1 forward solve apart")
+    J = bench.objective() if result.J is None else result.J
     if not np.isfinite(J):
         raise NonFinite(f"{route.name}: J = {J} - check p and the data")
     row |= {

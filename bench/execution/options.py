@@ -1,4 +1,4 @@
-"""Who runs the cases of a sweep: options, and what does not go together."""
+"""Options of the command line: limits, and who runs the cases of a sweep; what does not go together."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from gradient_routes.bench.command_options import Command, complain, refuse_given
-from gradient_routes.bench.execution.limited import pin
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,11 +18,58 @@ if TYPE_CHECKING:
 
     Executing = Callable[[bool, Limits, bool], How]  # isolate, limits, timed
 
+STOPS = "Seconds of wall time, after which {} is stopped, and {:g} s later killed with all it started; inf: none."
+ISOLATE = "In a process of its own, with hard limits; without, --timeout and --memory cannot hold."
+KILLS = "Seconds of wall time, after which {} is killed with all it started; inf: none."
+MEMORY = "Resident memory at which it is killed: 4GiB, 500MB. [what the machine has]"
+THREADS = "Threads of BLAS, PARDISO and XLA each."
+AFFINITY = "Processors to stay on: 0 or 0,2-3. [any]"
 KINDS = ("local", "dask")
 EXECUTOR = "This machine, or a Dask cluster: one case at a time on each worker, on each host where they are timed."
 SCHEDULER = "Of the Dask cluster: tcp://HOST:8786. [a cluster of this machine]"
 WORKERS = "Of a Dask cluster of this machine. [one; with --no-timing one a processor]"
 JOBS = "Cases side by side; for --no-timing only, they are in each other's way."
+
+
+def limit_options(what: str, timeout: float, last_words: float = 0.0) -> Callable[[Command], Command]:
+    """--isolate, --timeout, --memory, --threads, --affinity; the command gets `isolate` and `limits`.
+
+    What has `last_words` seconds at its limit of time is stopped before it is killed.
+    """
+    ends = STOPS.format(what, last_words) if last_words else KILLS.format(what)
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def with_limits(
+            *, isolate: bool, timeout: float, memory: str | None, threads: int, affinity: str | None, **others: Any
+        ) -> Any:
+            from gradient_routes.bench.execution.isolation import limits as given
+
+            if not isolate:
+                refuse_given(("timeout", "memory"), "holds for processes of their own, not with --no-isolate")
+            if isolate and os.name != "posix":
+                raise InputError("--isolate: needs pipes and process groups of POSIX - give --no-isolate here")
+            limits = given.Limits(
+                given.checked_timeout(timeout),
+                given.memory_of(memory),
+                given.checked_threads(threads),
+                given.affinity_of(affinity),
+            )
+            return command(isolate=isolate, limits=limits, **others)
+
+        options = (
+            click.option("--isolate/--no-isolate", default=True, show_default=True, help=ISOLATE),
+            click.option("--timeout", type=float, default=timeout, show_default=True, help=ends),
+            click.option("--memory", metavar="SIZE", help=MEMORY),
+            click.option("--threads", type=int, default=1, show_default=True, help=THREADS),
+            click.option("--affinity", metavar="LIST", help=AFFINITY),
+        )
+        decorated: Command = with_limits
+        for option in reversed(options):
+            decorated = option(decorated)
+        return decorated
+
+    return decorate
 
 
 def executor_options(command: Command) -> Command:
@@ -66,7 +112,7 @@ def here(isolate: bool, limits: Limits, timed: bool, jobs: int) -> How:
     if jobs > 1 and not isolate:
         raise InputError(f"--jobs {jobs}: needs processes - drop --no-isolate")
     if not isolate:
-        pin(limits)
+        limits.pin()
     return How(isolate, limits, jobs)
 
 

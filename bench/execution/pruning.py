@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-from gradient_routes.bench.cases.row import LIMITED, Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.row import LIMITED
 from gradient_routes.bench.units import size
 
 Size = tuple[int, int]  # n_u, n_p

@@ -9,7 +9,7 @@ from gradient_routes.problems.problem import Array
 from gradient_routes.routes.complex_step import RELATIVE_STEP
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State, norm
-from gradient_routes.routes.solvers.factorization import Factorization
+from gradient_routes.routes.solvers.solver import Factorization
 
 RTOL = 1e-13  # of |Im R|, which starts as h R_p v
 SOUND = 1e-6  # of the same: where rounding stops it above, the slope is not to be trusted

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 from gradient_routes.bench.cases.case import ProblemSpec, sized
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
-from gradient_routes.bench.cases.outcome import FOREIGN, bare
+from gradient_routes.bench.cases.outcome import bare
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution.executors.isolated import Line
+from gradient_routes.bench.cases.status import FOREIGN
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.process import Killed
+from gradient_routes.bench.execution.isolation.line import Line
+from gradient_routes.bench.execution.isolation.messages import Returned
+from gradient_routes.bench.execution.measure_job import Survey
 from gradient_routes.bench.execution.pruning import Size
-from gradient_routes.bench.execution.worker import Survey
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 
@@ -22,14 +25,11 @@ def sizes(problems: list[ProblemSpec], settings: Settings, limits: Limits | None
         return [_understood(surveyed(problem, settings.at)) for problem in problems]
     found: list[Size | None] = []
     while len(found) < len(problems):
-        line = Line(Survey(problems[len(found) :], settings), limits)
-        try:
-            while len(found) < len(problems):
-                found.append(_understood(line.hear()[1]))
-        except (EOFError, Killed):
+        with closing(Line(Survey(problems[len(found) :], settings), limits)) as line:
+            while len(found) < len(problems) and isinstance(message := line.hear(), Returned):
+                found.append(_understood(message.value))
+        if len(found) < len(problems):
             found.append(None)  # the one that it ended at
-        finally:
-            line.close()
     return found
 
 

@@ -9,16 +9,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.keys import identified, witnesses
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.bench.execution.measurement import begun_row
 from gradient_routes.bench.execution.pruning import Pruning, Size
 from gradient_routes.bench.execution.references import Found
 from gradient_routes.bench.execution.survey import sizes
-from gradient_routes.bench.execution.worker import Measure
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def explained(objective: Objective) -> str:
 
 def _if_loose(objective: Objective) -> str:
     solver, problem = objective.model.solver, objective.problem
-    iterates = not problem.linear or solver.linear_solver in ("cg-amg", "krylov", "descent")
+    iterates = not problem.linear or solver.linear.iterates
     if solver.rtol <= LOOSE or not iterates:
         return ""
     return f"; the forward solves are loose (--rtol {solver.rtol:g}): tighten them first"

@@ -14,7 +14,7 @@ from gradient_routes.problems.problem import Array
 
 @dataclass(frozen=True)
 class Iterate:
-    """One accepted step. Columns as in bench.studies.columns."""
+    """One accepted step. Fields are columns of its table."""
 
     iteration: int
     objective: float

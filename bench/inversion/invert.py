@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec, point
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from gradient_routes.bench.inversion.optimizers import Ended, Limits, Name, optimizer
+from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, optimizer
 from gradient_routes.bench.inversion.variables import Positive, Variables
-from gradient_routes.bench.studies.columns import RUN
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
 from gradient_routes.routes.model import Model
@@ -40,7 +40,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Inversion:
-    """The result: columns as in bench.studies.columns, and the arrays behind them.
+    """The result: fields are columns of its table, and the arrays behind them.
 
     p, gradient (n_p,) at the end; start p_0; truth where known; view: the problem's own columns
     end      why it stopped; interrupted: by Ctrl-C
@@ -132,7 +132,7 @@ def invert(
                 end = "converged: dJ/dp is 0 at the start"
             else:
                 end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
-        except Ended as ended:
+        except Stopped as ended:
             end = str(ended)
         except KeyboardInterrupt:
             if not history.iterates:

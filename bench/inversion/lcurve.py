@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.inversion.diagnosis import AT_MINIMUM
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.problems.errors import InputError
@@ -20,7 +20,7 @@ BENT = 3  # points that a curvature needs
 
 @dataclass(frozen=True)
 class Point:
-    """The minimum of J at one alpha. Columns as in bench.studies.columns."""
+    """The minimum of J at one alpha. Fields are columns of its table."""
 
     inversion: Inversion
     misfit: float

@@ -25,6 +25,12 @@ class OneShot:
     products: int
     forward_solves: int
 
+    def __str__(self) -> str:
+        return (
+            f"u is affine in p: one linear least-squares solve gives J = {self.J:.6g}, for {self.forward_solves}"
+            f" forward solves and {self.products} products with H; an iteration should reach that"
+        )
+
 
 def of_problem(problem: Problem, route: RouteSpec, engine: Engine, at: str) -> OneShot:
     """From a point of the problem. Raises what the first evaluation raises."""

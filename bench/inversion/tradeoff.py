@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Problem

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.environment import Environment, fingerprint
-from gradient_routes.bench.cases.row import COLUMNS, Column, Row, clean
+from gradient_routes.bench.cases.order import in_order
+from gradient_routes.bench.cases.row import COLUMNS, clean
 from gradient_routes.bench.regression.measured import KEPT, Case, Measured, Verdict, of_store
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
@@ -27,7 +30,7 @@ REMEDY = "write it anew with `routes baseline`"
 
 
 def measured(path: Path) -> Measured:
-    """A store or a baseline file. Raises InputError for anything else."""
+    """A store, in the order of `routes report`, or a baseline file. Raises InputError for anything else."""
     if path.is_dir():
         raise InputError(f"{path}: is a directory - name a store or a baseline in it")
     if not path.exists():
@@ -39,7 +42,8 @@ def measured(path: Path) -> Measured:
                 return read(path, start + file.read())
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error} - name a file you may read") from error
-    return of_store(Store(path))
+    found = of_store(Store(path))
+    return replace(found, cases=tuple(in_order(found.cases, lambda case: case.row)))
 
 
 def as_text(found: Measured) -> str:

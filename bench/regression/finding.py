@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 
 Judgement = Literal["same", "better", "worse", "shown", "not-compared"]
 JUDGEMENTS: tuple[Judgement, ...] = ("worse", "better", "shown", "not-compared", "same")  # in the order of interest

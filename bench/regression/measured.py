@@ -7,8 +7,9 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
-from gradient_routes.bench.cases.row import ENVIRONMENTS, Row, from_record
+from gradient_routes.bench.cases.row import ENVIRONMENTS, from_record
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from math import isfinite, log10
 from typing import Any
 
-from gradient_routes.bench.cases.row import ANSWERED, Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.row import ANSWERED
 from gradient_routes.bench.regression.finding import Finding, Judgement
 from gradient_routes.bench.regression.measured import Case, Verdict
 from gradient_routes.bench.render.format import bytes_, number

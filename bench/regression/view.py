@@ -7,15 +7,15 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.regression.compare import Comparison
 from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding, Judgement
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
 from gradient_routes.bench.render.terminal.tables import RESOLUTION, named, show, titled
+from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.routes.tally import Work
 
 METRICS = {
@@ -24,10 +24,12 @@ METRICS = {
     "gradient_error": "error",
     "peak_bytes": "memory",
     "tape_bytes": "tape",
-    "time": "x fwd",
+    "time": "cost / forward solve",
     "seconds": "seconds",
 }
-LEGEND = "before -> now; seconds are shown, never judged: time is judged in forward solves of the same run (x fwd)"
+LEGEND = (
+    "before -> now; cost / forward solve: time over that of a forward solve in the same run; seconds are not judged"
+)
 STYLES: dict[Judgement, str] = {"worse": "bold red", "better": "green", "not-compared": "dim"}
 FEW = 3  # cases that a line names
 
@@ -46,18 +48,14 @@ def show_comparison(out: Console, comparison: Comparison) -> None:
     out.print(Text(conclusion(comparison), style=style), soft_wrap=True)
 
 
-def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("problem\n  route", overflow="fold", min_width=14)
-    for heading in METRICS.values():
-        table.add_column(heading, overflow="fold", min_width=7)
+def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> TextTable:
+    table = TextTable(["problem\n  route", *(heading.replace(" / ", " /\n") for heading in METRICS.values())])
     before = None
     for problem, route, by_metric in cases:
         if problem != before:
-            table.add_row(Text(problem, style="bold"))
+            table.title(problem)
             before = problem
-        cells = (Text(*cell(by_metric.get(metric), metric)) for metric in METRICS)
-        table.add_row(Text(f"  {route}"), *cells)
+        table.row(Text(route), [Text(*cell(by_metric.get(metric), metric)) for metric in METRICS])
     return table
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from gradient_routes.bench.cases.row import Column
+from gradient_routes.bench.cases.column import Column
 from gradient_routes.bench.render.format import bytes_, number, seconds
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from gradient_routes.bench.cases.row import Column, Row
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Series, Table
 from gradient_routes.bench.render.picking import grouped, real, text
 from gradient_routes.bench.render.source import schema

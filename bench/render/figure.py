@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from gradient_routes.bench.cases.row import Column, clean
+from gradient_routes.bench.cases.column import Column
+from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.render.style import Style
 
 Scale = Literal["linear", "log", "category"]

@@ -1,4 +1,4 @@
-"""Numbers and options as a person reads them."""
+"""Numbers as text; None is empty."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Three digits, never an exponent."""
+    """Three digits, without an exponent."""
     return "" if value is None else f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
@@ -19,7 +19,7 @@ def seconds(value: float | None) -> str:
 
 
 def bytes_(value: float | None, resolution: int = 0) -> str:
-    """Below what can be resolved there is nothing to tell apart."""
+    """A size; below the resolution of its measurement only `<` that."""
     if value is None:
         return ""
     return size(value) if value >= resolution else f"<{size(resolution)}"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from gradient_routes.bench.cases.row import ANSWERED, ENVIRONMENTS, STATUSES, Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.row import ANSWERED, ENVIRONMENTS, STATUSES
 from gradient_routes.bench.execution.isolation.stack import without
 from gradient_routes.bench.render.figure import Figure, Note, Section, Table
 from gradient_routes.bench.render.format import number, ratio

@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from gradient_routes.bench.cases import registry
-from gradient_routes.bench.cases.row import Column, Row
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.render.figure import Table
 from gradient_routes.bench.render.source import schema
 

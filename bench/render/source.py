@@ -7,32 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.registry import Kind
-from gradient_routes.bench.cases.row import COLUMNS, Column, Row, from_record
+from gradient_routes.bench.cases.row import COLUMNS, from_record
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.tables import asked
-from gradient_routes.bench.store.store import TABLES, Store
-from gradient_routes.bench.studies.columns import STUDIES
-
-# what one line, or one panel, of a figure is about: the columns that name it, for the newest study of it
-ASKED: dict[str, tuple[str, ...]] = {
-    "checks": ("problem", "route", "at"),
-    "points": ("problem", "route", "at"),
-    "tolerance": ("problem", "problem_options", "at", "linear_solver", "sweep", "route"),
-    "unrolling": ("problem", "problem_options", "at", "inner", "checkpoint"),
-    "unrolling_fits": ("problem", "problem_options", "at", "inner", "checkpoint"),
-    "kink": ("problem", "at"),
-    "scaling_fits": ("problem", "problem_options", "at", "route", "route_options", "quantity", "against"),
-    "break_even": ("problem", "problem_options", "at", "route", "route_options", "other", "other_options"),
-    "inversion": ("problem", "problem_options", "at", "route", "route_options", "optimizer", "alpha"),
-    "estimates": ("problem", "problem_options", "at", "route", "route_options", "optimizer", "alpha"),
-    "lcurve": ("problem", "problem_options", "at", "route", "route_options", "optimizer"),
-    "tradeoff": ("problem", "problem_options", "at", "route", "route_options", "optimizer"),
-    "spectrum": ("experiment", "at"),
-    "identified": ("experiment", "at"),
-    "experiments": ("experiment", "at"),
-    "placement": ("experiment", "at", "criterion"),
-}
+from gradient_routes.bench.store.schema import tables as schema_tables
+from gradient_routes.bench.store.store import Store
 
 
 @dataclass(frozen=True)
@@ -58,8 +40,9 @@ class Source:
 def read(store: Store) -> Source:
     """Everything a report shows. Raises InputError where there is no store."""
     cases = cases_of(store)
-    found = {name: newest(store.records(name), ASKED.get(name, ("problem", "route"))) for name in STUDIES}
-    named = {name: [_named(row, STUDIES[name]) for row in rows] for name, rows in found.items()}
+    declared = registry.study_tables()
+    found = {name: newest(store.records(name), table.question) for name, table in declared.items()}
+    named = {name: [_named(row, declared[name].columns) for row in rows] for name, rows in found.items()}
     return Source(
         cases=latest(cases),
         kept=len(cases),
@@ -142,5 +125,5 @@ def _selector(kind: Kind, name: str, options: str) -> str:
 
 def schema(table: str) -> dict[str, Column]:
     """Columns of a table by name."""
-    columns = COLUMNS if table == "cases" else STUDIES.get(table, ())
-    return {column.name: column for column in columns} | {column.name: column for column in TABLES.get(table, ())}
+    columns = COLUMNS if table == "cases" else ()
+    return {column.name: column for column in (*columns, *schema_tables().get(table, ()))}

@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 from gradient_routes.bench.cases.case import problem_named, route_named
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.keys import content_key
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 

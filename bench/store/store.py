@@ -13,39 +13,37 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment, environment, fingerprint
-from gradient_routes.bench.cases.row import (
-    ENVIRONMENTS,
-    KEYS,
-    SAMPLES,
-    STORED,
-    Column,
-    Row,
-    as_record,
-    from_record,
-    stored,
-)
+from gradient_routes.bench.cases.row import ENVIRONMENTS, STORED, as_record, from_record, stored
 from gradient_routes.bench.cases.samples import Samples
-from gradient_routes.bench.studies.columns import KEY, STUDIES, STUDY
+from gradient_routes.bench.cases.suggest import did_you_mean
+from gradient_routes.bench.store.schema import KEY, tables
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
 SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: scaling, inversion, identifiability
 PATIENCE = 60.0  # [s] to wait for another writer
-TABLES: dict[str, tuple[Column, ...]] = {
-    "cases": (KEYS[0], KEYS[1], *STORED),
-    "samples": SAMPLES,
-    "environments": ENVIRONMENTS,
-    "studies": STUDY,
-    **{name: (KEY, *columns) for name, columns in STUDIES.items()},
-}
 
 
 class Store:
-    """A store on disk. `append` keeps a row, `table` gives one back. Every call opens the file and closes it."""
+    """What `routes` keeps: an SQLite file, `results/routes.sqlite` unless told otherwise.
+
+    Every call opens the file and closes it. Tables and columns: results/README.md.
+
+    >>> frame = run("bar", ["adjoint", "fd-central"], timing=False, store="routes.sqlite")
+    >>> Store("routes.sqlite").cases()[["case_id", "problem", "route", "status", "work_forward_solves"]]
+       case_id problem       route status  work_forward_solves
+    0        1     bar     adjoint     ok                    1
+    1        2     bar  fd-central     ok                   16
+    """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -84,15 +82,15 @@ class Store:
                     timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
                     db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
 
-    def append_study(self, tables: Mapping[str, Sequence[Row]], started: str) -> int:
+    def append_study(self, found: Mapping[str, Sequence[Row]], started: str) -> int:
         """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""
         with self._transaction() as db:
-            values = (next(iter(tables)), self._environment_id(db), started, "ok")
+            values = (next(iter(found)), self._environment_id(db), started, "ok")
             names = "study, environment_id, started, status"
             cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?)", values)
             study_id = int(cursor.lastrowid or 0)
-            for name, rows in tables.items():
-                columns = STUDIES[name]
+            for name, rows in found.items():
+                columns = tables()[name][1:]
                 marks = ", ".join("?" * (1 + len(columns)))
                 names = ", ".join(c.name for c in (KEY, *columns))
                 records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in rows]
@@ -107,10 +105,10 @@ class Store:
             db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
 
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Column names and rows of one of TABLES, oldest first. Raises InputError where there is no store."""
+        """Column names and rows of a table, oldest first. Raises InputError where there is no store."""
         with self._reading() as db:
             if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
-                return [c.name for c in TABLES[name]], []  # a store of an older schema
+                return [c.name for c in tables()[name]], []  # a store of an older schema
             cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
             return [d[0] for d in cursor.description], cursor.fetchall()
 
@@ -122,8 +120,8 @@ class Store:
         return [self._parsed(name, dict(zip(names, record, strict=True))) for record in values]
 
     def _parsed(self, table: str, record: Row) -> Row:
-        row: Row = dict.fromkeys(column.name for column in TABLES[table]) | record
-        for column in TABLES[table]:
+        row: Row = dict.fromkeys(column.name for column in tables()[table]) | record
+        for column in tables()[table]:
             value = row[column.name]
             if column.json and value is not None:
                 try:
@@ -135,6 +133,27 @@ class Store:
                         f"store {self.path}: {where}: no JSON ({error}) - delete that row, or name another store"
                     ) from error
         return row
+
+    def cases(self) -> DataFrame:
+        """All cases of `routes run`, oldest first: one row each. An absent value is NA, objects are JSON text.
+
+        Raises InputError where there is no store, or pandas is not installed.
+        """
+        return self._frame("cases")
+
+    def studies(self, table: str = "studies") -> DataFrame:
+        """All studies, oldest first, one row each; or the rows of one of their tables ("checks", "points" ...), which
+        belong to the study `study_id`. Raises InputError as `cases` does, and for a table that there is not.
+        """
+        known = ["studies", *registry.study_tables()]
+        if table not in known:
+            raise InputError(f"store: no table '{table}' of studies - {did_you_mean(table, known)}")
+        return self._frame(table)
+
+    def _frame(self, table: str) -> DataFrame:
+        from gradient_routes.bench.store.frames import frame
+
+        return frame(tables()[table], *self.table(table))
 
     def rows(self) -> list[Row]:
         """The cases as rows again."""
@@ -198,14 +217,14 @@ class Store:
     @staticmethod
     def _create_tables(db: sqlite3.Connection) -> None:
         """Those that are not there yet."""
-        for name, columns in TABLES.items():
+        for name, columns in tables().items():
             db.execute(f"CREATE TABLE IF NOT EXISTS {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
         db.execute("CREATE INDEX IF NOT EXISTS by_case ON cases (case_key)")
 
     def _migrate(self, db: sqlite3.Connection) -> None:
         """What an older schema lacks is added, absent in its rows."""
         if db.execute("PRAGMA user_version").fetchone()[0] < SCHEMA:
-            for name, columns in TABLES.items():
+            for name, columns in tables().items():
                 there = {column[1] for column in db.execute(f"PRAGMA table_info({name})")}
                 for column in columns:
                     if there and column.name not in there:

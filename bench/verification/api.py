@@ -28,18 +28,33 @@ def check(
     accept: float = 0.0,
     name: str | None = None,
 ) -> Check:
-    """Is this gradient right? The verdict with the numbers it rests on.
+    """Is this gradient right? The verdict with the numbers it rests on. `routes check`.
 
     objective  J(p) -> a number, p (n_p,) float64; or one object with objective(p) and gradient(p), or
                value_and_gradient(p), and start, and whatever of the keywords below it offers as attributes
     gradient   dJ/dp(p) -> (n_p,)
     start      p (n_p,) to check at
-    scale      natural changes, > 0 [|p_i|, for zeros the median of the others or 1]
-    bounds     (lower, upper), numbers or arrays: no point outside is asked for
+    scale      natural changes (n_p,), > 0 [|p_i|, for zeros the median of the others or 1]
+    bounds     (lower, upper), numbers or arrays (n_p,): no point outside is asked for
+    names      of the parameters, n_p of them
     tighten    tighten(factor) -> (objective, gradient), or such an object, the solver's tolerance times factor < 1
     active_set active_set(p) -> a hashable, which smooth branch of J holds
     budget     objective calls at most
+    seed       of the random directions
     accept     relative error of the gradient that is good enough [1e-7]
+    name       of the code, in the verdict
+
+    Returns a Check: `verdict` ("agrees", "wrong-gradient", "solver-limited", "non-smooth", "noise-limited" ...),
+    `says` why, with numbers, `todo`, the next thing to do, `culprit`, `calls`.
+
+    >>> import numpy as np
+    >>> def J(p):
+    ...     return float(np.sum(np.sin(p)))
+    >>> check(J, np.cos, start=[0.1, 0.2, 0.3]).verdict
+    'agrees'
+    >>> found = check(J, lambda p: np.cos(p) * [1.0, 1.0, 1.1], start=[0.1, 0.2, 0.3])
+    >>> print(found.verdict, "-", found.culprit)
+    wrong-gradient - component p_3, off by the factor 1.1
 
     Raises InputError for what cannot be asked; what the code itself does wrong is part of the verdict.
     """
@@ -71,8 +86,14 @@ def assert_gradient(
 ) -> None:
     """Raise AssertionError unless `check` of the same arguments, keywords included, says that the gradient agrees.
 
-    def test_my_gradient():
-        assert_gradient(J, dJ, start=np.ones(3), budget=100)
+    For tests:
+
+    >>> import numpy as np
+    >>> def test_my_gradient():
+    ...     assert_gradient(lambda p: float(p @ p), lambda p: 2.0 * p, start=np.ones(3), budget=100)
+    >>> test_my_gradient()
+
+    Raises InputError for what cannot be asked.
     """
     __tracebackhide__ = True  # pytest then shows the caller's line
     found = check(objective, gradient, start, **keywords)

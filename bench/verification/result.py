@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
@@ -24,6 +24,17 @@ Verdict = Literal[
 ]
 EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1}
 INCONCLUSIVE = 3
+MEANING: dict[Verdict, str] = {
+    "agrees": "the gradient and the difference quotients differ by no more than the quotients are uncertain by",
+    "wrong-gradient": "a difference that no step removes and no tighter forward solve reduces; where the solve cannot"
+    " be tightened, a difference of 1 % or more",
+    "inconsistent-discretization": "a difference that shrinks like h^k with the mesh size: the adjoint equation was"
+    " discretized on its own",
+    "solver-limited": "a difference, or noise, that falls when the forward solve is tightened",
+    "non-smooth": "one-sided quotients converge to different numbers, or active sets change between the points",
+    "noise-limited": "the noise of J leaves no usable step",
+    "undetermined": "none of these could be established; the sentence says why",
+}
 
 
 @dataclass(frozen=True)
@@ -86,7 +97,7 @@ class Check:
         return f"{self.name}: {self.verdict}: {self.says} - {self.todo}"
 
     @property
-    def convicted(self) -> Finding | None:
+    def proof(self) -> Finding | None:
         """The first finding that proves a part of the gradient wrong."""
         return next((f for f in self.findings if f.culprit is not None), None)
 

@@ -42,7 +42,7 @@ def _check_counts(o: SimpleNamespace) -> None:
             raise InputError(f"block: {name}={count} - choose {name} >= {value}")
     if o.cases > CASES:
         raise InputError(f"block: cases={o.cases} - there are 1 to {CASES}: along z, x, y")
-    greatest = max((o.nx or o.n) * (o.ny or o.n) * (o.nz or o.n), o.markers, o.layers)
+    greatest = max((o.nx or o.n) * (o.ny or o.n) * (o.nz or o.n), o.markers, o.layers or 0)
     if greatest > MOST:
         raise InputError(f"block: {greatest:g} cells, markers or layers - at most {MOST:g}")
 
@@ -56,7 +56,7 @@ def _check_applies(o: SimpleNamespace) -> None:
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
-        ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers != 4}),
+        ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers}),
         ("unknown=shape", o.unknown == "shape", True, {"surface": o.surface != "right"}),
         ("load=displacement", gripped, True, {"displacement": o.displacement != 0.2}),
         ("load=displacement", gripped, False, {"traction": o.traction != 0.2}),

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 UnknownName = Literal["modulus", "layers", "constants", "traction", "shape", "load"]
 FIELDS: tuple[UnknownName, ...] = ("modulus", "layers")
 MATERIAL: tuple[UnknownName, ...] = ("modulus", "layers", "constants")
+MAX_DEFAULT_LAYERS = 4
 THETA_MAX = 300.0  # exp of it is far from float64's end, and so are its squares
 
 
@@ -78,20 +79,34 @@ def moduli(body: Body, law: Law, nu: float, log: bool, blank: bool) -> Unknown:
     return _of_modulus(law, nu, log, start, inclusion(x), cells, body.geometry.centres, "E")
 
 
-def layers(body: Body, law: Law, nu: float, log: bool, blank: bool, count: int) -> Unknown:
-    """One Young's modulus for each of `count` layers of equal height."""
-    x = body.relative(body.geometry.centres)
-    layer = np.minimum((x[:, 2] * count).astype(int), count - 1)
-    z = (np.arange(count) + 0.5) / count
-    empty = np.setdiff1d(np.arange(count), layer)
+def layers(body: Body, law: Law, nu: float, log: bool, blank: bool, count: int | None) -> Unknown:
+    """One Young's modulus per layer, of `count` layers of equal height; None: the most, up to 4, that all hold a cell.
+
+    Raises InputError where a layer holds no cell's centre.
+    """
+    height = body.relative(body.geometry.centres)[:, 2]
+    if count is None:
+        count = next(n for n in range(MAX_DEFAULT_LAYERS, 0, -1) if not _empty_layers(height, n).size)
+    empty = _empty_layers(height, count)
     if empty.size:
         raise InputError(
             f"{body.who}: layers={count}, but no cell's centre lies in layer {empty[0] + 1} - choose fewer"
         )
+    layer = _layer_numbers(height, count)
+    z = (np.arange(count) + 0.5) / count
     middle = np.stack([np.full(count, 0.5)] * 2 + [z], axis=1)
     start = np.ones(count) if blank else 1.0 + 0.3 * z
     position = body.box[0] + middle * (body.box[1] - body.box[0])
     return _of_modulus(law, nu, log, start, inclusion(middle), layer, position, "E_layer")
+
+
+def _layer_numbers(height: Array, count: int) -> Array:
+    """The layer (n_e,) of cells whose centres lie at a height from 0 to 1."""
+    return np.asarray(np.minimum((height * count).astype(int), count - 1))
+
+
+def _empty_layers(height: Array, count: int) -> Array:
+    return np.setdiff1d(np.arange(count), _layer_numbers(height, count))
 
 
 def _of_modulus(

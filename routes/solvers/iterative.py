@@ -1,14 +1,16 @@
-"""Linear solvers that end where they are told to: iterations without a preconditioner, to a tolerance.
+"""Linear solvers that iterate to a tolerance without a preconditioner.
 
-A study of tolerances asks where an iteration ends, so the true b - A x decides, and no last correction is taken
-unchecked as in `krylov.py`. Complex systems are solved by the same steps, nothing conjugated: a complex step then
-differentiates the iterate.
+For studies of tolerances: the true residual b - A x decides where they end, and no last correction is taken without
+computing its residual, as `krylov.py` does. Complex systems are solved by the same steps with nothing conjugated, so
+that a complex step differentiates the iterate.
 """
 
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Literal
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -16,132 +18,140 @@ from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.matrices.sparse import GeneralSparse, SymmetricSparse
 from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
 from gradient_routes.problems.problem import Array
+from gradient_routes.routes.solvers.krylov import ConjugateGradients, dot, norm
+from gradient_routes.routes.solvers.solver import Factorization, Factorize, LinearSolver
 
-Kind = Literal["krylov", "descent"]
-AT_MOST = {"krylov": 20_000, "descent": 500_000}  # products of a solve
-MEMORY = {"krylov": 200, "descent": 1}  # directions before a restart, where A is not symmetric
-NAMES = {
-    ("krylov", True): "conjugate gradients",
-    ("krylov", False): "GMRES",
-    ("descent", True): "steepest descent",
-    ("descent", False): "minimal residuals",
-}
-SOUND = 1e-6  # |b - A x| / |b| that rounding may leave: beyond, x is large because A is singular
+SOUND = 1e-6  # |b - A x| / |b| that rounding may leave: beyond it, x is large because A is singular
 GROWN = 1.0 / np.finfo(np.float64).eps  # of |r|_2^2 over |b|_2^2: cond(A) where A is positive definite, at most
 STILL = 1.0 - 1e-6  # of |r|_2, before a restart
 ROUNDING = 16.0 * np.finfo(np.float64).eps  # |b - A x| <= ROUNDING |A| |x|: no iteration can do better
 
 
-class IterativeFactorization:
-    """Solves A x = b to |b - A x|_inf <= rtol |b|_inf, or to rounding. Its products are not counted, as multigrid's.
+@dataclass(frozen=True)
+class Method:
+    """An iteration for symmetric A, and one for general A.
 
-    krylov   conjugate gradients (Hestenes & Stiefel 1952) where A is symmetric; where that turns out indefinite, or A
-             is general, GMRES (in the simpler form of Walker & Zhou 1994, restarted)
-    descent  the same without memory: steepest descent (Cauchy 1847) and minimal residuals. Slow, but evenly so on few
-             unknowns, where conjugate gradients are off until the n-th step and exact from there on. Indefinite A it
-             rarely solves
-
-    solve raises NotConverged.
+    symmetric, general  their names
+    at_most             products of a solve
+    directions          kept before a restart, where A is not symmetric; one: no memory, also where A is symmetric
     """
 
-    def __init__(self, A: Any, who: str, kind: Kind, rtol: float) -> None:
-        self._who, self._kind, self.rtol = who, kind, rtol
+    symmetric: str
+    general: str
+    at_most: int
+    directions: int
+
+    def named(self, symmetric: bool) -> str:
+        return self.symmetric if symmetric else self.general
+
+
+# conjugate gradients of Hestenes & Stiefel 1952, GMRES in the simpler form of Walker & Zhou 1994
+KRYLOV = Method("conjugate gradients", "GMRES", 20_000, 200)
+# Cauchy 1847. It converges slowly but evenly, where conjugate gradients on few unknowns have a large error until the
+# n-th step and are exact from there on. On indefinite A it rarely converges
+DESCENT = Method("steepest descent", "minimal residuals", 500_000, 1)
+
+
+class IterativeFactorization(Factorization):
+    """Solves A x = b to |b - A x|_inf <= rtol |b|_inf, or to rounding. Its products are not counted, nor are those of
+    multigrid. A symmetric A that turns out to be indefinite is solved as a general one. A solve raises NotConverged.
+    """
+
+    def __init__(self, method: Method, rtol: float, A: Any, who: str) -> None:
+        self._who, self._method, self.rtol = who, method, rtol
         self._symmetric = A.T is A or (isinstance(A, np.ndarray) and bool((A == A.T).all()))
-        self.name = NAMES[kind, self._symmetric]
+        self.name = method.named(self._symmetric)
         known = isinstance(A, Chain | Bordered | SymmetricSparse | GeneralSparse)
         self.norm = float(A.norm if known else abs(A).sum(axis=1).max())
-        self.nbytes = int((A if known else A.data).nbytes)
+        self._nbytes = int((A if known else A.data).nbytes)
         self._A = A.full().tocsr() if isinstance(A, SymmetricSparse) else A
 
+    @property
+    def nbytes(self) -> int:
+        return self._nbytes
+
     def to(self, rtol: float) -> IterativeFactorization:
-        """The same matrix, solved to another tolerance."""
         other = copy(self)
         other.rtol = rtol
         return other
 
-    def solve(self, b: Array) -> Array:
-        return self._solve(self._A, b)
-
-    def solve_transposed(self, b: Array) -> Array:
-        return self._solve(self._A if self._symmetric else self._A.T, b)
-
-    def _solve(self, A: Any, b: Array) -> Array:
-        """Iterations on what is left, until the true residual is small: the one carried along drifts from it."""
-        x, r, size, before, products = np.zeros_like(b), b, _norm(b), np.inf, 0
+    def substitute(self, b: Array, transposed: bool) -> Array:
+        """Iterations on b - A x, restarted until the true residual is small: the one carried along drifts from it."""
+        A, method = self._A.T if transposed and not self._symmetric else self._A, self._method
+        x, r, size, before, products = np.zeros_like(b), b, norm(b), np.inf, 0
         wanted, sound = self.rtol * size, SOUND * size
-        symmetric, at_most = self._symmetric, AT_MOST[self._kind]
+        symmetric, at_most = self._symmetric, method.at_most
         enough = wanted
         while size > enough and size < before and products < at_most:
             if symmetric:
-                dx, more = _conjugate_gradients(A, r, wanted, at_most - products, memory=self._kind == "krylov")
+                dx, more = _conjugate_gradients(A, r, wanted, at_most - products, memory=method.directions > 1)
                 symmetric = dx is not None
             if not symmetric:
-                dx, more = _minimal_residuals(A, r, wanted, at_most - products, MEMORY[self._kind])
+                dx, more = _minimal_residuals(A, r, wanted, at_most - products, method.directions)
             x, products = x + dx, products + more
             r, before = b - A @ x, size
-            size = _norm(r)
-            enough = max(wanted, min(sound, ROUNDING * self.norm * _norm(x)))
+            size = norm(r)
+            enough = max(wanted, min(sound, ROUNDING * self.norm * norm(x)))
         if not size <= enough:
-            came = f"|b - A x| = {size / _norm(b):.2g} |b| after {products} products, wanted {self.rtol:.2g}"
-            name = NAMES[self._kind, symmetric]  # that it ended with
-            raise NotConverged(f"{self._who}: {name}: {came} - loosen the tolerance or take --linear-solver auto", ())
+            reached = f"|b - A x| = {size / norm(b):.2g} |b| after {products} products, wanted {self.rtol:.2g}"
+            name = method.named(symmetric)
+            raise NotConverged(
+                f"{self._who}: {name}: {reached} - loosen the tolerance or take --linear-solver auto", ()
+            )
         return x
 
 
 def _conjugate_gradients(A: Any, b: Array, wanted: float, at_most: int, memory: bool) -> tuple[Array | None, int]:
-    """x with |r|_inf <= wanted, r the residual carried along, and the products taken; None where A is indefinite.
-
-    That shows in a direction's energy, or in an |r| that grows as no minimum of the energy lets it.
+    """x with |r|_inf <= wanted, r the residual carried along, and the products taken; None where A is indefinite:
+    d.Ad is not positive, or |r| grows further than it can while the energy of a definite A falls.
     """
-    x, r, d = np.zeros_like(b), b, b
-    rr, k = _dot(r, r), 0
-    bound = GROWN * abs(rr)
-    while _norm(r) > wanted and k < at_most:
-        Ad = A @ d
+    cg = ConjugateGradients(A.__matmul__, lambda r: r, b)
+    k, bound = 0, GROWN * abs(cg.rz)
+    while norm(cg.r) > wanted and k < at_most:
+        energy = cg.multiply()
         k += 1
-        energy = _dot(d, Ad)
-        if not (energy.real > 0.0 and abs(rr) <= bound):
+        if not (energy.real > 0.0 and abs(cg.rz) <= bound):
             return None, k
-        alpha = rr / energy
-        x, r = x + alpha * d, r - alpha * Ad
-        rr, rr_before = _dot(r, r), rr
-        d = r + rr / rr_before * d if memory else r
-    return x, k
+        cg.advance()
+        cg.redirect(memory)
+    return cg.x, k
 
 
 def _minimal_residuals(A: Any, b: Array, wanted: float, at_most: int, memory: int) -> tuple[Array, int]:
-    """The same for any A; it stops where it stands still. The directions' products are q, A q, A^2 q ..., q = A r."""
+    """The same for any A; it stops where |r| no longer falls. The directions span q, A q, A^2 q ..., q = A r."""
     x, r, k = np.zeros_like(b), b, 0
-    while _norm(r) > wanted and k < at_most:
+    while norm(r) > wanted and k < at_most:
         directions: list[tuple[Array, Array]] = []  # d and A d, the A d orthonormal
         start = _norm2(r)
-        while _norm(r) > wanted and len(directions) < memory:
+        while norm(r) > wanted and len(directions) < memory:
             d = directions[-1][1] if directions else r
             Ad = A @ d
             k += 1
             for e, Ae in directions:
-                along = _dot(Ae, Ad)
+                along = dot(Ae, Ad)
                 d, Ad = d - along * e, Ad - along * Ae
-            length = np.sqrt(_dot(Ad, Ad))
+            length = np.sqrt(dot(Ad, Ad))
             if length == 0.0:
                 return x, k
             d, Ad = d / length, Ad / length
             directions.append((d, Ad))
-            share = _dot(Ad, r)
+            share = dot(Ad, r)
             x, r = x + share * d, r - share * Ad
         if not _norm2(r) < STILL * start:
             break
     return x, k
 
 
-def _dot(a: Array, b: Array) -> Any:
-    """a . b, nothing conjugated; without BLAS, which wakes its threads too soon."""
-    return (a * b).sum()
-
-
 def _norm2(v: Array) -> float:
     return float(np.sqrt((np.abs(v) ** 2).sum()))
 
 
-def _norm(v: Array) -> float:
-    return float(np.abs(v).max(initial=0.0))
+def solver(name: str, method: Method, gradual: bool) -> LinearSolver:
+    def start(rtol: float) -> Factorize:
+        return partial(IterativeFactorization, method, rtol)
+
+    return LinearSolver(name, start, takes=lambda A: True, iterates=True, factors=False, gradual=gradual)
+
+
+krylov = solver("krylov", KRYLOV, gradual=False)
+descent = solver("descent", DESCENT, gradual=True)

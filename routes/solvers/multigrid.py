@@ -6,27 +6,32 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.errors import NotConverged, SingularMatrix
+from gradient_routes.problems.errors import InputError, NotConverged, SingularMatrix
 from gradient_routes.problems.matrices.sparse import SymmetricSparse
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.krylov import conjugate_gradients
+from gradient_routes.routes.solvers.solver import Factorization, Factorize, LinearSolver
+from gradient_routes.routes.solvers.superlu import is_sparse
 
 RTOL = 1e-13  # |b - A x|_inf / |b|_inf: a digit below what Newton's method and refined adjoints ask for
 AT_MOST = 500  # products
 
 
-class MultigridFactorization:
+class MultigridFactorization(Factorization):
     """Solves A x = b, A symmetric positive definite, to |b - A x|_inf <= 1e-13 |b|_inf or to rounding.
 
-    The hierarchy (Vanek, Mandel & Brezina 1996; of pyamg) is built on the near-kernel its pattern knows. solve raises
+    The hierarchy (Vanek, Mandel & Brezina 1996; of pyamg) is built on the near-kernel its pattern knows. A solve raises
     NotConverged where the iteration stalls, SingularMatrix where A turns out not to be positive definite.
     """
 
     name = "multigrid CG"
 
-    def __init__(self, A: SymmetricSparse, who: str) -> None:
+    def __init__(self, A: Any, who: str) -> None:
         import pyamg
 
+        if not isinstance(A, SymmetricSparse) or np.iscomplexobj(A.data):
+            kind = "complex" if isinstance(A, SymmetricSparse) else "not known to be symmetric"
+            raise InputError(f"{who}: cg-amg solves real symmetric systems, R_u is {kind} - take pardiso or superlu")
         self._who = who
         bad = np.flatnonzero(~(A.diagonal > 0.0))
         if bad.size:
@@ -40,9 +45,13 @@ class MultigridFactorization:
         )
         self._cycle = levels.aspreconditioner()
         self.norm = A.norm
-        self.nbytes = int(levels.operator_complexity() * self._A.nnz * (self._A.dtype.itemsize + 4))
+        self._nbytes = int(levels.operator_complexity() * self._A.nnz * (self._A.dtype.itemsize + 4))
 
-    def solve(self, b: Array) -> Array:
+    @property
+    def nbytes(self) -> int:
+        return self._nbytes
+
+    def substitute(self, b: Array, transposed: bool) -> Array:
         wanted = RTOL * float(np.abs(b).max(initial=0.0))
         done = conjugate_gradients(
             self._A.__matmul__, self._cycle.__matmul__, b, wanted, at_most=AT_MOST, definite=True, tried=AT_MOST
@@ -53,8 +62,6 @@ class MultigridFactorization:
             stalled = f"{self._who}: multigrid CG stalls: {done.products} products, each |r| x {done.rate:.3g}"
             raise NotConverged(f"{stalled} - take --linear-solver pardiso or superlu", ())
         return done.x
-
-    solve_transposed = solve
 
     def _indefinite(self, why: str) -> str:
         return f"{self._who}: R_u is not positive definite ({why}) - take --linear-solver pardiso or superlu"
@@ -68,3 +75,10 @@ def _blocked(A: Any, near_kernel: Array | None) -> Any:
     A = csr_matrix((A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32)), shape=A.shape)
     by_nodes = near_kernel is not None and n % 3 == 0 and (near_kernel[:, :3] == np.tile(np.eye(3), (n // 3, 1))).all()
     return A.tobsr((3, 3)) if by_nodes else A
+
+
+def start(rtol: float) -> Factorize:
+    return MultigridFactorization
+
+
+cg_amg = LinearSolver("cg-amg", start, takes=is_sparse, iterates=True)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import importlib.util
 import weakref
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.errors import SingularMatrix
+from gradient_routes.problems.errors import InputError, SingularMatrix
+from gradient_routes.problems.matrices.sparse import GeneralSparse, SymmetricSparse
 from gradient_routes.problems.problem import Array
+from gradient_routes.routes.solvers import superlu
+from gradient_routes.routes.solvers.solver import Factorization, Factorize, LinearSolver
+from gradient_routes.routes.solvers.superlu import REGULAR, solution_error
 
 POSITIVE_DEFINITE, SYMMETRIC, COMPLEX_SYMMETRIC, GENERAL, COMPLEX_GENERAL = 2, -2, 6, 11, 13
 KINDS = {
@@ -22,18 +26,18 @@ KINDS = {
 
 # PARDISO's parameters by index, counted from 0
 ORDERING, PIVOT_EPS, SCALING, TRANSPOSED, MATCHING, PERTURBED, ANALYSIS_KB, FACTORS_KB = 1, 9, 10, 11, 12, 13, 15, 16
+NEGATIVE = 22  # eigenvalues of a symmetric matrix
 # nested dissection takes 0.6 of the time of minimum degree, the default, on a solid of 14 000 unknowns; pivots below
 # 1e-12 |A| count as zero: a body without clamp leaves rounding there, and the default takes it for a pivot
 SETTINGS = {ORDERING: 2, PIVOT_EPS: 12}
 UNSYMMETRIC = {SCALING: 1, MATCHING: 1}
-REGULAR = 1e-2  # error of a solution that was known before; a regular matrix leaves eps times its condition number
 EXHAUSTED = "not enough memory"  # what PARDISO says
 IDLE = 6  # two for each of three load cases: analyses kept for reuse, a pattern and kind
 
 Idle = dict[tuple[int, bool], list[Any]]
 
 
-class PardisoFactorization:
+class PardisoFactorization(Factorization):
     """Factors of a SymmetricSparse (not Hermitian where complex) or GeneralSparse.
 
     The transposed solve of a general matrix needs factors of its own, made when first asked for and then kept:
@@ -53,13 +57,18 @@ class PardisoFactorization:
         solvers = {id(s): s for s in (self.solver, self._transposed) if s is not None}
         return 1024 * sum(int(s.get_iparm_value(i)) for s in solvers.values() for i in (ANALYSIS_KB, FACTORS_KB))
 
-    def solve(self, b: Array) -> Array:
-        return self._substitute(self.solver, b)
-
-    def solve_transposed(self, b: Array) -> Array:
+    def substitute(self, b: Array, transposed: bool) -> Array:
+        if not transposed:
+            return self._substitute(self.solver, b)
         if self._transposed is None:
             self._transposed = self._factorized(self._A, transposed=True)
         return self._substitute(self._transposed, b)
+
+    @property
+    def negative_eigenvalues(self) -> int | None:
+        if self._mtype == POSITIVE_DEFINITE:
+            return 0
+        return int(self.solver.get_iparm_value(NEGATIVE)) if self._mtype == SYMMETRIC else None
 
     def _substitute(self, solver: Any, b: Array) -> Array:
         dtype = np.complex128 if self._mtype in (COMPLEX_SYMMETRIC, COMPLEX_GENERAL) else np.float64
@@ -98,12 +107,6 @@ class PardisoFactorization:
         return SingularMatrix(f"{what}: {why} - check p and the supports")
 
 
-def solution_error(A: Any, solve: Callable[[Array], Array]) -> float:
-    """|x - x_0|_inf for A x = A x_0 with a known x_0, |x_0|_inf = 1."""
-    x = np.cos(np.arange(A.shape[0]))
-    return float(np.abs(solve(A @ x) - x).max(initial=0.0))
-
-
 def _refactored(solver: Any, A: Any) -> Any:
     """The solver with factors of A, or None where its analysis, made for other entries, does not suit these."""
     try:
@@ -116,3 +119,47 @@ def _refactored(solver: Any, A: Any) -> Any:
 def _keep(waiting: list[Any], solver: Any) -> None:
     if len(waiting) < IDLE:
         waiting.append(solver)
+
+
+class Pardiso:
+    """Factorizes by MKL PARDISO. A pattern is analyzed once: factors that are no longer referenced leave their analysis
+    to the next ones.
+    """
+
+    def __init__(self) -> None:
+        self._idle: weakref.WeakKeyDictionary[Any, Idle] = weakref.WeakKeyDictionary()
+
+    def __call__(self, A: SymmetricSparse | GeneralSparse, who: str) -> Factorization:
+        """Raises SingularMatrix."""
+        idle, complex_ = self._idle.setdefault(A.pattern, {}), np.iscomplexobj(A.data)
+        if isinstance(A, GeneralSparse):
+            return PardisoFactorization(A, who, COMPLEX_GENERAL if complex_ else GENERAL, idle)
+        if complex_:
+            return PardisoFactorization(A, who, COMPLEX_SYMMETRIC, idle)
+        try:
+            return PardisoFactorization(A, who, POSITIVE_DEFINITE, idle)
+        except SingularMatrix:  # or not positive definite, as at an unstable state
+            return PardisoFactorization(A, who, SYMMETRIC, idle)
+
+
+def installed() -> bool:
+    return importlib.util.find_spec("pymklpardiso") is not None
+
+
+def start(rtol: float) -> Factorize:
+    if not installed():
+        raise InputError("linear solver pardiso: py-mkl-pardiso is not installed - pip install it or take superlu")
+    return Pardiso()
+
+
+def start_best(rtol: float) -> Factorize:
+    """PARDISO where it is installed, else SuperLU."""
+    return start(rtol) if installed() else superlu.start(rtol)
+
+
+def takes(A: Any) -> bool:
+    return isinstance(A, SymmetricSparse | GeneralSparse)
+
+
+pardiso = LinearSolver("pardiso", start, takes)
+auto = LinearSolver("auto", start_best, takes)

@@ -88,11 +88,14 @@ def _known(function: Callable[[Any], Any] | None) -> Callable[[Any], Any]:
 
 
 def conjugate_gradients(matvec: Callable[[Any, Any], Any], f: Callable[[Any], Any]) -> Iteration:
-    """Hestenes & Stiefel 1952. Past convergence it stands still: no 0/0 in the iterate nor in its derivative.
+    """Hestenes & Stiefel 1952. After convergence the iterate stays constant: no 0/0 in it nor in its derivative.
 
-    alpha = r.d / d.Kd equals r.r / d.Kd only while rounding leaves r.d = r.r, but minimizes along d always; on
-    ill-conditioned K its reverse sweep loses up to five digits less. Both amplify rounding there, without bound: the
-    iterate then converges and its gradient by AD does not (bench warns of it). Measure.
+    Apart from `krylov.ConjugateGradients`, because a tape needs other steps than a solve:
+    - every branch is a `where`, the iteration has no end and no breakdown;
+    - alpha = r.d / d.Kd equals r.r / d.Kd only while rounding leaves r.d = r.r, but minimizes along d always; on
+      ill-conditioned K its reverse sweep loses up to five digits less. Both amplify rounding there, without bound: the
+      iterate then converges and its gradient by AD does not;
+    - r.d is carried along instead of r, so that the tape keeps three vectors an iteration, not four.
     """
 
     def start(at: Any) -> tuple[Any, ...]:
@@ -108,7 +111,7 @@ def conjugate_gradients(matvec: Callable[[Any, Any], Any], f: Callable[[Any], An
         u, r = u + alpha * d, r - alpha * Kd
         rr_next = r @ r
         beta = jnp.where(moving, rr_next / jnp.where(moving, rr, 1.0), 0.0)
-        # r.d from the old d: the tape then keeps three vectors a step, not four
+        # r.d of the next step from the old d
         return u, r, r + beta * d, rr_next, rr_next + beta * (r @ d), ff
 
     return Iteration(start, step)

@@ -7,9 +7,10 @@ import numpy as np
 from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain, cumulative_sum
 from gradient_routes.problems.problem import Array
+from gradient_routes.routes.solvers.solver import Factorization
 
 
-class ChainFactorization:
+class ChainFactorization(Factorization):
     """B^T D B is its own factorization: its inverse is B^{-1} D^{-1} B^{-T}, two cumulative sums.
 
     With a spring k behind the last node, the correction of rank one (Sherman & Morrison 1950) is written as the force
@@ -21,9 +22,13 @@ class ChainFactorization:
     def __init__(self, K: Chain, who: str) -> None:
         check_positive(K.D, who)
         self.D, self.tip = K.D, K.tip
-        self.norm, self.nbytes = K.norm, K.nbytes
+        self.norm = K.norm
 
-    def solve(self, b: Array) -> Array:
+    @property
+    def nbytes(self) -> int:
+        return self.D.nbytes
+
+    def substitute(self, b: Array, transposed: bool) -> Array:
         if not self.tip:
             forces = cumulative_sum(b[::-1])[::-1]  # B^{-T} b: what hangs behind each element
             return cumulative_sum(forces / self.D)
@@ -31,10 +36,15 @@ class ChainFactorization:
         t = (b[-1] - self.tip * w_N) / (1.0 + self.tip * C)
         return stretched(self.D, h, t, (w_N + C * b[-1]) / (1.0 + self.tip * C))
 
-    solve_transposed = solve
+    @property
+    def negative_eigenvalues(self) -> int | None:
+        """The spring adds k e e^T to a positive definite matrix: one if k is below the -1/C of the chain, else none."""
+        if np.iscomplexobj(self.D) or np.iscomplexobj(self.tip):
+            return None
+        return int(1.0 + self.tip * (1.0 / self.D).sum() < 0.0)
 
 
-class BorderedFactorization:
+class BorderedFactorization(Factorization):
     """L D L^T of a chain with a multiplier on its last node: the nodes before it one by one, then those two at once.
 
     Their 2 x 2 pivot [[1/C + c, 1], [1, 0]], C the compliance of the whole chain, has the determinant -1: it is regular
@@ -46,9 +56,13 @@ class BorderedFactorization:
     def __init__(self, A: Bordered, who: str) -> None:
         check_positive(A.D, who)
         self.D, self.c, self.active = A.D, A.c, A.active
-        self.norm, self.nbytes = A.norm, A.nbytes
+        self.norm = A.norm
 
-    def solve(self, b: Array) -> Array:
+    @property
+    def nbytes(self) -> int:
+        return self.D.nbytes
+
+    def substitute(self, b: Array, transposed: bool) -> Array:
         if not self.active:
             forces = cumulative_sum(b[-2::-1])[::-1]
             return np.concatenate([cumulative_sum(forces / self.D), -self.c * b[-1:]])
@@ -57,7 +71,10 @@ class BorderedFactorization:
         t = (u_N - w_N) / C
         return np.append(stretched(self.D, h, t, u_N), b[-2] - self.c * u_N - t)
 
-    solve_transposed = solve
+    @property
+    def negative_eigenvalues(self) -> int | None:
+        """That of the multiplier, active or not."""
+        return None if np.iscomplexobj(self.D) else 1
 
 
 def check_positive(D: Array, who: str) -> None:

@@ -139,6 +139,18 @@ def test_a_follower_pressure_has_a_tangent_that_is_not_symmetric() -> None:
     assert abs(K - K.T).max() > 1e-3 * abs(K).max()
 
 
+@pytest.mark.parametrize(("nz", "n_p"), [(1, 1), (2, 2), (3, 3), (4, 4), (5, 4), (9, 4)])
+def test_layers_default_to_four_or_what_the_mesh_has(nz: int, n_p: int) -> None:
+    block = Block(n=1, nz=nz, unknown="layers")
+    p = block.parameters.start
+    assert len(p) == n_p
+    finer, q = block.refined(p)
+    assert len(finer.parameters) == len(q) == n_p
+    assert set(block.mechanics.unknown.group) == set(range(n_p))
+    with pytest.raises(InputError, match=r"lies in layer \d - choose fewer"):
+        Block(n=1, nz=nz, unknown="layers", layers=nz + 1 if nz < 4 else 2 * nz)
+
+
 @pytest.mark.parametrize("where", ["top", "right", "z=1"])
 def test_markers_read_what_the_shape_functions_say(where: str) -> None:
     """A displacement that is affine in X is read exactly at every marker; in-plane leaves the normal out."""

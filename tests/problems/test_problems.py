@@ -12,7 +12,7 @@ from gradient_routes.problems.bar import Bar, true_modulus
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.jax64 import jax
-from gradient_routes.problems.problem import Offers, Problem
+from gradient_routes.problems.problem import Offers, Problem, offer_names
 from gradient_routes.routes.model import Model
 
 ZOO = zoo()
@@ -68,6 +68,19 @@ def test_numpy_and_jax_evaluate_the_same_physics(name: str) -> None:
     R, J = jax.jit(lambda u, p: (traced.residual(u, p), traced.objective(u, p)))(u, p)  # op by op it would compile long
     np.testing.assert_allclose(R, problem.residual(u, p), rtol=1e-13, atol=1e-13)
     assert float(J) == pytest.approx(problem.objective(u, p), rel=1e-13)
+
+
+def test_every_bit_of_an_offer_has_a_name() -> None:
+    """Python 3.11.2 takes the mask of an enum.Flag from members of one bit and drops, or refuses, all other bits."""
+    members = Offers.__members__.values()
+    single = {member.value for member in members if member.value.bit_count() == 1}
+    for member in members:
+        assert {1 << i for i in range(member.value.bit_length()) if member.value >> i & 1} <= single, member.name
+    assert [offer_names(member) for member in (Offers.VALUE, Offers.SOLVE, Offers.LINEARIZE | Offers.TRACE)] == [
+        ["value"],
+        ["solve"],
+        ["linearize", "trace"],
+    ]
 
 
 @everywhere

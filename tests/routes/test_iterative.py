@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import relative_error
@@ -18,8 +20,8 @@ from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
-from gradient_routes.routes.solvers.factorization import Factorizer, to_tolerance
-from gradient_routes.routes.solvers.iterative import AT_MOST, ROUNDING
+from gradient_routes.routes.solvers.factorization import Factorizer
+from gradient_routes.routes.solvers.iterative import DESCENT, ROUNDING, solver
 from gradient_routes.routes.tally import Work
 from gradient_routes.routes.tangent import tangent
 
@@ -56,10 +58,10 @@ def test_they_end_at_the_tolerance(linear_solver, kind: str, rtol: float) -> Non
         assert abs(left).max() <= rtol * abs(b).max()
         if kind not in SIZES and rtol > 1e-6:  # conjugate gradients jump there; GMRES near its last direction
             assert abs(left).max() > 1e-3 * rtol * abs(b).max(), "solved further than asked"
-    tight = to_tolerance(factors, 1e-12)
+    tight = factors.to(1e-12)
     x = tight.solve(b)
     assert abs(b - A @ x).max() <= max(1e-12 * abs(b).max(), ROUNDING * factors.norm * abs(x).max())
-    assert to_tolerance(tight, rtol).solve(b).tobytes() == factors.solve(b).tobytes()
+    assert tight.to(rtol).solve(b).tobytes() == factors.solve(b).tobytes()
     assert not factors.solve(0.0 * b).any()
     assert factors.nbytes > 0 < factors.norm
 
@@ -74,7 +76,8 @@ def test_what_stalls_says_how_far_it_came() -> None:
 
 @pytest.mark.parametrize("kind", sorted(INDEFINITE))
 def test_descent_on_an_indefinite_matrix_is_right_or_one_line(monkeypatch, kind: str) -> None:
-    monkeypatch.setitem(AT_MOST, "descent", 10_000)
+    shorter = solver("descent", replace(DESCENT, at_most=10_000), gradual=True)
+    monkeypatch.setattr("gradient_routes.routes.solvers.factorization.linear_solver", lambda name: shorter)
     A = MATRICES[kind]
     b = np.random.default_rng(7).standard_normal(SIZES.get(kind) or A.shape[0])
     try:

@@ -11,7 +11,7 @@ from distributed import Client
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.execution.cluster.dispatch import PATIENCE, Dispatch
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.worker import Measure
+from gradient_routes.bench.execution.measure_job import Measure
 
 
 class Cluster:

@@ -12,7 +12,7 @@ from uuid import uuid4
 from distributed import CancelledError, Client, Future
 
 from gradient_routes.bench.cases.environment import Environment, environment, versions
-from gradient_routes.bench.cases.outcome import one_line
+from gradient_routes.bench.cases.status import one_line
 from gradient_routes.bench.execution.cluster.remote import Greeting
 from gradient_routes.problems.errors import InputError
 

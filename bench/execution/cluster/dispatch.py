@@ -17,9 +17,9 @@ from gradient_routes.bench.cases.outcome import Outcome, failed, note
 from gradient_routes.bench.execution.cluster.dask_workers import Crew, Member, Tell, sent
 from gradient_routes.bench.execution.cluster.remote import packed
 from gradient_routes.bench.execution.cluster.shipped_case import sealed
-from gradient_routes.bench.execution.executors.interrupt import Interrupt
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.worker import Measure
+from gradient_routes.bench.execution.isolation.signals import Interrupt
+from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.problems.errors import RoutesError
 
 TICK = 0.5  # [s] between two looks at who is there

@@ -8,13 +8,15 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from gradient_routes.bench.execution.isolation.messages import Begun, Done
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-    from gradient_routes.bench.cases.row import Row
+    from gradient_routes.bench.cases.column import Row
+    from gradient_routes.bench.execution.isolation.channel import Channel
+    from gradient_routes.bench.execution.measure_job import Measure
     from gradient_routes.bench.execution.references import Found
-    from gradient_routes.bench.execution.worker import Channel, Measure
 
 
 @dataclass(frozen=True)
@@ -30,20 +32,24 @@ class Sealed:
     row: Row
     found: Found
 
+    @property
+    def name(self) -> str:
+        return str(self.row["route"])
+
     def __call__(self, channel: Channel) -> None:
         from gradient_routes.bench.cases.environment import environment
         from gradient_routes.bench.cases.keys import witnesses
         from gradient_routes.bench.cases.outcome import Outcome, failed
-        from gradient_routes.bench.execution.worker import Measure
+        from gradient_routes.bench.execution.measure_job import Measure
 
         try:
             problem, route, settings = pickle.loads(self.parts)
             checked_s = self._check(problem, route, settings.at)
         except InputError as error:
-            channel.say("environment", environment())
+            channel.say(Begun(environment()))
             row = failed(self.row, self.row["route"], error)
             row["reason"] = f"{self.row['route']} on {self.row['host']}: {error}"
-            channel.say("done", (Outcome(row), {}))
+            channel.say(Done(Outcome(row), {}))
             return
         row = self.row | {"prepare_s": -checked_s}  # at home nobody checks: it is no part of the preparation
         Measure(problem, route, settings, row, self.found, witnesses(problem, route, settings.at))(channel)

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from functools import cache
 
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
-from gradient_routes.bench.cases.outcome import FOREIGN, Outcome, refused, unbuilt
+from gradient_routes.bench.cases.outcome import Outcome, refused, unbuilt
+from gradient_routes.bench.cases.status import FOREIGN
 from gradient_routes.bench.execution.case_context import Workbench
 from gradient_routes.bench.execution.executors.running import interleaved
+from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.bench.execution.measurement import Measurement, measure
-from gradient_routes.bench.execution.worker import Measure
 from gradient_routes.problems.errors import DomainError, InputError
 
 

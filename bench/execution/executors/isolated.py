@@ -2,107 +2,38 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import subprocess
-import sys
-import threading
-import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import replace
-from multiprocessing import Pipe
-from queue import Empty, SimpleQueue
 from typing import Any
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
 from gradient_routes.bench.cases.outcome import Outcome, refused
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.cluster.shipped_case import Sealed
 from gradient_routes.bench.execution.executors.running import alone
+from gradient_routes.bench.execution.isolation.channel import Call
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.process import Confined, Killed
+from gradient_routes.bench.execution.isolation.line import Line
+from gradient_routes.bench.execution.isolation.messages import (
+    Begun,
+    Done,
+    Ended,
+    Finish,
+    Known,
+    Message,
+    Ready,
+    Returned,
+    Turn,
+    Turned,
+)
 from gradient_routes.bench.execution.isolation.stack import where
+from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.bench.execution.references import Found
-from gradient_routes.bench.execution.worker import Call, Job, Measure
-from gradient_routes.problems.errors import RoutesError
+from gradient_routes.problems.errors import InputError, RoutesError
 
 Case = Measure | Sealed
-
-
-class Line:
-    """A confined worker doing a job, and the messages it sends, read beside: half a message must stop nobody."""
-
-    def __init__(self, job: Job, limits: Limits, cwd: str | None = None) -> None:
-        self._left = limits.timeout
-        self.connection, other = Pipe()
-        with other:
-            self.process = Confined(
-                "gradient_routes.bench.execution.worker",
-                [str(other.fileno())],
-                limits,
-                pass_fds=[other.fileno()],
-                cwd=cwd,
-                stdin=subprocess.DEVNULL,
-            )
-        with suppress(OSError):  # it is gone: hearing will tell
-            self.connection.send((limits, os.getpid(), sys.path))
-            self.connection.send(job)
-        self._heard: SimpleQueue[Any] = SimpleQueue()
-        self._message: Any = None
-        self._listening = threading.Thread(target=self._listen, daemon=True)
-        self._listening.start()
-
-    def hear(self) -> tuple[str, Any]:
-        """Its next message. Raises Killed at a limit, EOFError where it has ended, with no word or a broken one."""
-        start = time.monotonic()
-        try:
-            self.process.watch(self._came, start + self._left)
-        finally:
-            self._left -= time.monotonic() - start
-        try:
-            kind, what = self._message
-        except (TypeError, ValueError) as broken:
-            raise EOFError from broken
-        return kind, what
-
-    def _listen(self) -> None:
-        message: Any = ()
-        while message is not None:
-            try:
-                message = self.connection.recv()
-            except Exception:  # its end, half a message, or one that cannot be read here
-                message = None
-            self._heard.put(message)
-
-    def _came(self, seconds: float) -> bool:
-        """Whether a message has, within so many seconds."""
-        if self.process.gone:
-            self._hang_up()  # a child it has left behind may hold the line open: who listens gets what is on it yet
-        try:
-            self._message = self._heard.get(timeout=seconds)
-        except Empty:
-            return False
-        return True
-
-    def say(self, kind: str, what: Any = None) -> None:
-        """A dead worker is found out when it is heard."""
-        with suppress(OSError):
-            self.connection.send((kind, what))
-
-    def close(self) -> None:
-        """Whatever it and its children are at, it ends; who listens does before the line's descriptor is given away,
-        or it would read on from the next that gets it.
-        """
-        self.process.kill()
-        self._hang_up()
-        self._listening.join()
-        self.connection.close()
-
-    def _hang_up(self) -> None:
-        """Nothing more will come, whoever holds the other end."""
-        with suppress(OSError), socket.fromfd(self.connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as line:
-            line.shutdown(socket.SHUT_RDWR)
 
 
 class Isolated:
@@ -115,21 +46,21 @@ class Isolated:
         self._phase = "its start"
         self._environment: Environment | None = None
         self._ended: Outcome | None = None
-        self._line = Line(replace(job, found=dict(job.found)), limits, cwd)
+        self._line = Line(replace(job, found=dict(job.found)), limits, cwd=cwd)
 
     def prepared(self) -> Outcome | None:
-        return self._until("ready")
+        return self._until(Ready)
 
     def turn(self) -> bool:
         if self._ended is None:
-            self._line.say("turn")
-            self._until("turned")
+            self._line.say(Turn())
+            self._until(Turned)
         return self._ended is None and self._more
 
     def outcome(self, interleaved: int) -> Outcome:
         if self._ended is None:
-            self._line.say("finish", interleaved)
-            self._until("done")
+            self._line.say(Finish(interleaved))
+            self._until(Done)
         assert self._ended is not None
         return self._ended
 
@@ -140,70 +71,64 @@ class Isolated:
         """From another thread than the one that listens, which will hear that it has ended."""
         self._line.process.kill()
 
-    def _until(self, wanted: str) -> Outcome | None:
+    def _until(self, wanted: type[Ready | Turned | Done]) -> Outcome | None:
         """Listen until it says so, or until it has ended: then its outcome."""
-        kind = ""
-        try:
-            while kind != wanted and self._ended is None:
-                kind, what = self._line.hear()
-                self._take(kind, what)
-        except Killed as limit:
-            self._ended = self._died(limit.status, limit.reason)
-        except EOFError:
-            ending = self._line.process.ending()
-            self._ended = self._died(ending.status, ending.reason)
+        message: Message | None = None
+        while not isinstance(message, wanted) and self._ended is None:
+            message = self._line.hear()
+            self._take(message)
         if self._ended is not None:
             self._line.close()  # now all of its stderr has come
             row = self._ended.row | {"stderr": self._line.process.stderr or None}
             self._ended = replace(self._ended, row=row)
         return self._ended
 
-    def _take(self, kind: str, what: Any) -> None:
-        if kind == "environment":
-            self._environment = what
-        elif kind == "known":
-            self._phase, self._row = what
-        elif kind == "ready":
-            self.long, found = what
-            self.found.update(found)  # for cases that are prepared before this one is done
-        elif kind == "turned":
-            self._more = what
-        elif kind == "refused":
-            self._ended = refused(self._row, what)
-        elif kind == "done":
-            self._ended, found = what
-            self.found.update(found)
+    def _take(self, message: Message) -> None:
+        match message:
+            case Begun(environment):
+                self._environment = environment
+            case Known(phase, row):
+                self._phase, self._row = phase, row
+            case Ready(long, found):
+                self.long = long
+                self.found.update(found)  # for cases that are prepared before this one is done
+            case Turned(more):
+                self._more = more
+            case Done(outcome, found):
+                self._ended = outcome
+                self.found.update(found)
+            case Ended(Status.REFUSED, reason):
+                self._ended = refused(self._row, InputError(reason))
+            case Ended():
+                self._ended = self._died(message)
 
-    def _died(self, status: str, reason: str) -> Outcome:
+    def _died(self, end: Ended) -> Outcome:
         """What was known when it died is kept."""
-        error = self._row["gradient_error"]
-        at = where(self._line.process.stderr)
+        error, status = self._row["gradient_error"], end.status
+        reason = end.reason
+        if status in (Status.OK, Status.INTERRUPTED):
+            status, reason = Status.CRASHED, "its process was told to end"
         known = "" if error is None else f"; its gradient was known by then, its error {error:.2g}"
         row = self._row | {
             "status": status,
-            "reason": f"{self._row['route']}: {status} in {self._phase}{at}: {reason}{known}",
+            "reason": f"{self._row['route']}: {status} in {self._phase}{where(end.stderr)}: {reason}{known}",
+            "traceback": end.traceback or None,
         }
         return Outcome(row, environment=self._environment)
 
 
 def called(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Limits) -> Any:
     """What a function of a module returns in a process of its own. Raises RoutesError where that ends before."""
-    line = Line(Call(function, arguments), limits)
-    try:
-        return line.hear()[1]
-    except Killed as limit:
-        raise RoutesError(f"{function.__name__}: {limit.status} {limit.reason} - raise the limit") from None
-    except EOFError:
-        ending = line.process.ending()
-        raise RoutesError(f"{function.__name__}: {ending.status}: {ending.reason} - see {last(line)}") from None
-    finally:
-        line.close()
-
-
-def last(line: Line) -> str:
-    """The last thing it said."""
-    said = [each for each in line.process.stderr.splitlines() if each.strip()]
-    return said[-1].strip() if said else "nothing, it said nothing"
+    job = Call(function, arguments)
+    with closing(Line(job, limits)) as line:
+        message = line.hear()
+    if isinstance(message, Returned):
+        return message.value
+    assert isinstance(message, Ended)
+    said = [each.strip() for each in message.stderr.splitlines() if each.strip()] or ["nothing, it said nothing"]
+    todo = f"see {said[-1]}" if message.status is Status.CRASHED else message.status.todo
+    what = f"{message.status}: {message.reason} - {todo}" if todo else message.reason
+    raise RoutesError(f"{job.name}: {what}")
 
 
 def whole(job: Case, limits: Limits, cwd: str | None = None) -> Outcome:

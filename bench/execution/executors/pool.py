@@ -7,10 +7,10 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
 
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.execution.executors.interrupt import Interrupt
 from gradient_routes.bench.execution.executors.isolated import Isolated, finished
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.worker import Measure
+from gradient_routes.bench.execution.isolation.signals import Interrupt
+from gradient_routes.bench.execution.measure_job import Measure
 
 TICK = 0.1  # [s] between two looks whether it is interrupted
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from dataclasses import dataclass
 
 from gradient_routes.problems.errors import InputError
@@ -38,6 +39,16 @@ class Limits:
         one = ["--xla_cpu_multi_thread_eigen=false"] if self.threads == 1 else []
         given = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in one]
         return pools | ({"XLA_FLAGS": " ".join(given + one)} if given + one else {})
+
+    def pin(self) -> None:
+        """Threads and processors of this very process: by variables where libraries are yet to be loaded."""
+        os.environ.update(self.environment)
+        if "numpy" in sys.modules:
+            from threadpoolctl import threadpool_limits
+
+            threadpool_limits(self.threads)
+        if self.affinity is not None:
+            os.sched_setaffinity(0, self.affinity)
 
 
 def memory_of(text: str | None) -> int | None:

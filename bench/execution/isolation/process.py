@@ -10,12 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import IO, Any
 
 import psutil
 
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.execution.isolation.stack import ASKED, without
 from gradient_routes.bench.units import size
 
@@ -33,17 +34,9 @@ EXHAUSTED = (
 class Killed(Exception):
     """The process was killed at a limit: `status` is timeout or out-of-memory, `reason` has the numbers."""
 
-    def __init__(self, status: str, reason: str) -> None:
+    def __init__(self, status: Status, reason: str) -> None:
         super().__init__(reason)
         self.status, self.reason = status, reason
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How a process ended that nobody stopped."""
-
-    status: str
-    reason: str
 
 
 class Confined:
@@ -87,11 +80,11 @@ class Confined:
             taken = self._memory() if self.limits.memory is not None else 0
             if self.limits.memory is not None and taken > self.limits.memory:
                 self.kill()
-                raise Killed("out-of-memory", f"{size(taken)} > {size(self.limits.memory)} of --memory")
+                raise Killed(Status.OUT_OF_MEMORY, f"{size(taken)} > {size(self.limits.memory)} of --memory")
             if time.monotonic() >= deadline:
                 self._hear_out()
                 self.kill()
-                raise Killed("timeout", f"after {self.limits.timeout:g} s of --timeout")
+                raise Killed(Status.TIMEOUT, f"after {self.limits.timeout:g} s of --timeout")
 
     def _hear_out(self) -> None:
         if self._last_words is not None:
@@ -131,22 +124,22 @@ class Confined:
             self._killed = True
         self._pump.join(1.0)
 
-    def ending(self) -> Ending:
+    def ending(self) -> Ended:
         """What became of a process that is ending without having said why: its exit code or signal, read."""
         ended = self.ended(GRACE)
         self.kill()  # what it started may still run
         if not ended:
-            return Ending("crashed", f"it hung up and was still running {GRACE:g} s later")
+            return Ended(Status.CRASHED, f"it hung up and was still running {GRACE:g} s later")
         code = self.process.wait()
         if any(word in self._last_line() for word in EXHAUSTED) and code != -signal.SIGSEGV:
             cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
-            return Ending("out-of-memory", f"an allocation failed within --memory{cap}: {self._last_line()}")
+            return Ended(Status.OUT_OF_MEMORY, f"an allocation failed within --memory{cap}: {self._last_line()}")
         if code >= 0:
-            return Ending("crashed", f"its process ended with exit code {code}")
+            return Ended(Status.CRASHED, f"its process ended with exit code {code}")
         name = signal.Signals(-code).name if -code in {*signal.Signals} else f"signal {-code}"
         if -code == signal.SIGKILL and _oom_kills() > self._oom_kills:
-            return Ending("out-of-memory", "killed by the system, which ran out of memory")
-        return Ending("crashed", f"its process was ended by {name}")
+            return Ended(Status.OUT_OF_MEMORY, "killed by the system, which ran out of memory")
+        return Ended(Status.CRASHED, f"its process was ended by {name}")
 
     @property
     def stderr(self) -> str:

@@ -1,4 +1,4 @@
-"""Colours and marks: a route has the same one everywhere, told apart by the colour-blind (Okabe & Ito 2008)."""
+"""Colour and mark of each route, distinguishable by the colour-blind (Okabe & Ito 2008)."""
 
 from __future__ import annotations
 
@@ -24,5 +24,5 @@ MARKS = {
 
 
 def route_style(name: str) -> str:
-    """The rich style of a route; plug-ins have none of their own."""
+    """The rich style of a route; none for plug-ins."""
     return ROUTES.get(name, "")

@@ -1,4 +1,4 @@
-"""A quantity on linear axes in plain characters: for signs and jumps, which decades would hide."""
+"""A plot on linear axes in plain characters, for quantities that change sign or jump."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def panel(
     height: int = 9,
     wall: float | None = None,
 ) -> Text:
-    """Points (x, y, mark) within `width` columns, `height` rows; a wall at one x, a rule where y = 0.
+    """Plot points (x, y, mark) in `width` columns and `height` rows.
 
-    Labels are the ends of both axes and the wall.
+    A vertical line marks x = `wall`, a horizontal one y = 0. Labels are the ends of both axes and the wall.
     """
     xs, ys = [x for x, _, _ in points], [y for _, y, _ in points]
     low, high = min(ys), max(ys)
@@ -52,7 +52,7 @@ def _cell(value: float, low: float, high: float, cells: int) -> int:
 
 
 def _x_axis(name: str, low: float, high: float, wall: float | None, margin: int, cells: int) -> str:
-    """The ends and the wall, where it leaves room."""
+    """Labels of the ends and, where there is room, of the wall."""
     line = " " * margin + f"{low:.3g}"
     end = f"{name} = {high:.3g}"
     if wall is not None:

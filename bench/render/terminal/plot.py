@@ -1,4 +1,4 @@
-"""A log-log plot in plain characters, for terminals and pipes."""
+"""A log-log plot in plain characters."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ SEVERAL = "*"  # where there is no room for marks side by side
 
 @dataclass(frozen=True)
 class Series:
-    """Points (x, y) of one name, drawn with one character in one rich style.
+    """Points (x, y) drawn with one character in one rich style.
 
-    x is > 0; y = 0 is drawn on a line of its own at the bottom. What is absent, negative or not finite is not drawn:
-    the legend counts it.
+    y = 0 has a line of its own at the bottom. Points with x <= 0, y < 0, None or not finite are left out and counted in
+    the legend.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Series:
 
     @property
     def points(self) -> list[tuple[float, float]]:
-        """Those that can be drawn."""
+        """The points that can be drawn."""
         pairs = zip(self.x, self.y, strict=True)
         return [(x, y) for x, y in pairs if x and y is not None and 0.0 < x < math.inf and 0.0 <= y < math.inf]
 
@@ -45,7 +45,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Axis:
-    """Whole decades low..high, powers of ten, over `cells` characters."""
+    """Decades 10^low to 10^high over `cells` characters."""
 
     low: int
     high: int
@@ -63,21 +63,21 @@ class Axis:
         return round((exponent - self.low) / (self.high - self.low) * (self.cells - 1))
 
     def ticks(self, room: int) -> dict[int, str]:
-        """Labels of decades by their cells, every so many that each has `room` cells."""
+        """Labels of decades by cell, as many as have `room` cells each."""
         per_decade = (self.cells - 1) / (self.high - self.low)
         every = max(1, math.ceil(room / per_decade))
         return {self._cell(e): label(e) for e in range(self.low, self.high + 1) if e % every == 0}
 
 
 def label(exponent: int) -> str:
-    """A power of ten: 1 to 1000 as they are, others with their exponent."""
+    """10^exponent: 1 to 1000 in full, others as 1e6."""
     return str(10**exponent) if 0 <= exponent <= 3 else f"1e{exponent}"
 
 
 def plot(series: Sequence[Series], x_label: str, y_label: str, width: int, height: int = 16) -> Text:
-    """`height` rows within `width` columns, ticks at decades, a legend below.
+    """Plot in `height` rows and `width` columns, with ticks at decades and a legend below.
 
-    Marks of several series that would fall on one another stand side by side.
+    Marks of several series at the same place are put side by side.
     """
     points = [point for s in series for point in s.points]
     if not points:
@@ -104,7 +104,7 @@ Cells = dict[int, tuple[str, str]]  # column -> mark and style
 
 
 def _drawn(series: Sequence[Series], x_axis: Axis, y_axis: Axis) -> list[Cells]:
-    """The rows from the bottom, the line of zeros last."""
+    """The rows from the bottom up, the line of zeros last."""
     rows: list[Cells] = [{} for _ in range(y_axis.cells + 1)]
     for s in series:
         for x, y in s.points:
@@ -141,7 +141,7 @@ def _room(axis: Axis) -> int:
 
 
 def _legend(series: Sequence[Series], width: int) -> Text:
-    """Marks and names, as many on a line as fit."""
+    """Marks and names, filling lines."""
     text, used = Text(), 0
     for s in series:
         if used and used + 3 + len(s.legend) > width:
@@ -154,7 +154,7 @@ def _legend(series: Sequence[Series], width: int) -> Text:
 
 
 def marks(names: Sequence[str]) -> list[str]:
-    """One character for each name, all different: that of the route, else a letter of the name, else any."""
+    """One character for each name, all different: the mark of the route, else a letter of the name, else any."""
     taken: list[str] = []
     for name in names:
         letters = [c for c in name.upper() + name if c.isalnum() and c.isascii()]

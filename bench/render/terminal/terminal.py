@@ -1,4 +1,4 @@
-"""Rich's console, for text of others."""
+"""Rich's console for foreign text and for pipes that close."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from gradient_routes.bench.sanitize import plain, unread
 
 
 class Terminal(Console):
-    """No text has control characters; those of styles and of live displays are the console's own. A reader who leaves
-    ends nothing.
+    """Removes control characters from text, but not those of the console's own styles; output to a closed pipe is
+    discarded.
     """
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import shlex
-import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -24,14 +23,13 @@ from gradient_routes.bench.command_options import (
     solver_options,
     store_options,
 )
-from gradient_routes.bench.execution.limited import limit_options
-from gradient_routes.bench.execution.options import executor_options
+from gradient_routes.bench.execution.options import executor_options, limit_options
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
+    from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.expected import Expectation
-    from gradient_routes.bench.cases.outcome import Outcome, View
-    from gradient_routes.bench.cases.row import Row
+    from gradient_routes.bench.cases.outcome import Outcome
     from gradient_routes.bench.execution.isolation.limits import Limits
     from gradient_routes.bench.execution.options import Executing
     from gradient_routes.bench.store.store import Store
@@ -43,6 +41,9 @@ GRADIENT = "Show the gradient parameter by parameter beside its reference; with 
 COMPONENTS = "Only so many components of dJ/dp, drawn at random: the bill of each, and its error."
 DIRECTIONS = "Only the slopes of J along so many random directions."
 VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView; for one problem and one route."
+SENSITIVITIES = "Write du/dp as FILE.csv, FILE.npz or FILE.vtu; for one problem and --route tangent."
+OF = "Of the state, du/dp, or of the data, d(S u)/dp."
+COLUMNS = "Parameters whose columns of du/dp are written, also to --vtu: 1,5-8. [all; none to --vtu]"
 BUDGET = "Skip gradients predicted to take more seconds, or more memory than there is; inf forces them."
 TIMING = "Without, gradients are computed and judged, their work counted and memory read, but not timed."
 RESUME = "Only cases that the store lacks, that failed, or whose code, data or libraries have changed."
@@ -63,6 +64,9 @@ ONLY = "The same for cases of one kind; all: each again."
 @click.option("--seed", type=int, default=0, show_default=True, help="Of --components and --directions.")
 @click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
+@click.option("--sensitivities", type=click.Path(path_type=Path), metavar="FILE", help=SENSITIVITIES)
+@click.option("--sensitivities-of", type=click.Choice(["state", "data"]), default="state", show_default=True, help=OF)
+@click.option("--columns", metavar="LIST", help=COLUMNS)
 @click.option("--resume", is_flag=True, help=RESUME)
 @click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
 @click.option("--expected", type=click.Path(path_type=Path), metavar="FILE.toml", help=EXPECTED)
@@ -84,6 +88,9 @@ def run(
     seed: int,
     gradient: str | None,
     vtu: Path | None,
+    sensitivities: Path | None,
+    sensitivities_of: str,
+    columns: str | None,
     resume: bool,
     only: Only | None,
     expected: Path | None,
@@ -104,30 +111,37 @@ def run(
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.partial import chosen
     from gradient_routes.bench.cases.settings import Settings
-    from gradient_routes.bench.execution.executors.interrupt import Interrupt
+    from gradient_routes.bench.execution.isolation.signals import Interrupt, interruptible
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.store import Store
-    from gradient_routes.bench.studies.bill.files import Files
+    from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
+    from gradient_routes.bench.studies.bill.sensitivity_files import wanted as columns_wanted
 
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     partial = chosen(components, directions, seed)
     how = executing(isolate, limits, timed)
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
-    files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu)
+    files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu, sensitivities)
     count = len(problem_specs) * len(route_specs)
-    files.check(count, partial, [*([kept] if kept else []), *case.files(problem_specs, at)])
+    files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *case.files(problem_specs, at)])
+    if sensitivities is None:
+        refuse_given(("sensitivities_of",), "is of --sensitivities")
+        if vtu is None or route_specs[0].name != COLUMNS_OF:
+            refuse_given(("columns",), f"is of --sensitivities, and of --vtu with --route {COLUMNS_OF}")
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
-    settings = Settings(at, checked(budget), min_time, timed, gradient is not None, solver, partial, vtu is not None)
+    du_dp = columns_wanted(sensitivities, sensitivities_of, columns, files.fields)
+    budget = checked(budget)
+    settings = Settings(at, budget, min_time, timed, gradient is not None, solver, partial, files.fields, du_dp)
     store = None if kept is None else Store(kept)
     known = _expectations(expected, kept)
     wanted = _wanted(store, resume, only, known)
     if store is not None:
         store.check_writable()
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
-    done = Done(store, as_json, known, views=gradient is not None or vtu is not None)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: with a table
+    done = Done(store, as_json, known, views=gradient is not None or files.fields)
+    interruptible()  # SIGTERM ends it like Ctrl-C: with a table
     try:
         with closing(outcomes):  # whatever interrupts, cases under way are ended first
             for outcome in with_progress(outcomes, count):
@@ -138,7 +152,7 @@ def run(
         raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
     finally:  # an interrupt leaves what was measured on the screen, too
         done.show(gradients=gradient == SHOWN)
-        said, failed = files.write(done.outcomes)
+        said, failed = files.write(done.ordered)
         for line in said:
             click.echo(line, err=as_json)
     if resume or only:
@@ -160,28 +174,46 @@ class Done:
         self.store, self.as_json, self.known, self._views = store, as_json, known, views
         self.outcomes: list[Outcome] = []
         self.lost: list[str] = []
+        self._waiting: dict[int, Row] = {}  # by their place: rows that come before the next to print
+        self._next = 0
 
     def take(self, outcome: Outcome) -> None:
-        from gradient_routes.bench.cases.row import as_json
-
+        """Keep a row at once; print it, as JSON, once all rows before it are printed."""
         try:
             if self.store is not None:
                 self.store.append(outcome.row, outcome.samples, outcome.environment)
         except InputError as error:  # a full disk, a lock: the row is printed all the same
             self.lost.append(str(error))
-        if self.as_json:
-            click.echo(as_json(outcome.row))
+        self._waiting[outcome.place] = outcome.row
+        while self._next in self._waiting:
+            self._print(self._next)
+            self._next += 1
         slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
         self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
 
+    def _print(self, place: int) -> None:
+        from gradient_routes.bench.cases.row import as_json
+
+        row = self._waiting.pop(place)
+        if self.as_json:
+            click.echo(as_json(row))
+
     def show(self, gradients: bool) -> None:
-        """The table, in the order asked for, and gradients where those were asked for."""
+        """The table in the order asked for, and gradients where those were asked for; rows of JSON that still wait."""
+        from gradient_routes.bench.studies.bill.view import show
+
+        for place in sorted(self._waiting):
+            self._print(place)
         if self.as_json:
             return
-        ordered = sorted(self.outcomes, key=lambda outcome: outcome.place)
-        views = [(o.row, o.view) for o in ordered if o.view is not None and gradients]
+        views = [(o.row, o.view) for o in self.ordered if o.view is not None and gradients]
         kept = None if self.store is None or self.lost else self.store.path
-        show([o.row for o in ordered], views, kept, self.known)
+        show([o.row for o in self.ordered], views, kept, self.known)
+
+    @property
+    def ordered(self) -> list[Outcome]:
+        """The outcomes in the order asked for."""
+        return sorted(self.outcomes, key=lambda outcome: outcome.place)
 
     @property
     def failures(self) -> list[Row]:
@@ -219,33 +251,6 @@ def _resumed() -> str:
     """This command again, for what is left."""
     given = [word for word in sys.argv[1:] if word != "--resume"]
     return shlex.join(["routes", *given, "--resume"])
-
-
-def show(
-    rows: list[Row],
-    views: Iterable[tuple[Row, View]] = (),
-    kept: Path | None = None,
-    known: Sequence[Expectation] = (),
-) -> None:
-    """The table, the reasons and notes below it, what was expected, the gradients where they were asked for."""
-    from gradient_routes.bench.cases.expected import judged
-    from gradient_routes.bench.render.terminal import tables
-
-    if not rows:
-        return
-    out = tables.console()
-    tables.show(out, tables.results(rows))
-    for line in tables.remarks(rows):
-        out.print(line, soft_wrap=not out.is_terminal)
-    for row in rows:
-        verdict = judged(row, known)
-        if verdict is not None:
-            out.print(f"{tables.titled(row)}: {row['route']}: {verdict.says}", style="yellow", soft_wrap=True)
-    if kept is not None:
-        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
-    for row, view in views:
-        out.print()
-        tables.show(out, tables.gradient(row, view))
 
 
 def with_progress(outcomes: Iterator[Outcome], count: int) -> Iterator[Outcome]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 
 from gradient_routes.bench.cases import registry
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Guide, Section, Series
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
 from gradient_routes.bench.render.picking import by_column, grouped, in_order, real, tabulate, text

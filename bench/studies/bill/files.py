@@ -1,41 +1,67 @@
-"""The files a run writes beside the store: refused before anything is measured, written when all is."""
+"""The files a run writes beside the store: checked before anything is measured, written at the end."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.partial import Partial
 from gradient_routes.bench.store.output_files import check_writable
 from gradient_routes.problems.errors import InputError
 
+COLUMNS_OF = "tangent"  # the route whose linearized states the columns are
+
 
 @dataclass(frozen=True)
 class Files:
-    """Where --gradient and --vtu write, if anywhere."""
+    """Where --gradient, --vtu and --sensitivities write, if anywhere."""
 
     gradient: Path | None = None
     vtu: Path | None = None
+    sensitivities: Path | None = None
 
-    def check(self, cases: int, partial: Partial | None, taken: Iterable[Path]) -> None:
+    @property
+    def fields(self) -> bool:
+        """Whether one of the files holds fields on the mesh."""
+        return self.vtu is not None or (self.sensitivities is not None and self.sensitivities.suffix == ".vtu")
+
+    def check(self, problems: int, routes: Sequence[RouteSpec], partial: Partial | None, taken: Iterable[Path]) -> None:
         """Raise InputError for what cannot be written, for files in `taken`, for fields of anything but one case."""
-        if self.vtu is not None and cases != 1:
-            raise InputError(f"--vtu {self.vtu}: holds one problem and one route, these are {cases} cases - name one")
-        if self.vtu is not None and partial is not None:
-            raise InputError(f"--vtu {self.vtu}: needs the whole gradient - drop --{partial.kind}")
-        taken = list(taken)
-        for option, path in (("--gradient", self.gradient), ("--vtu", self.vtu)):
+        cases, taken = problems * len(routes), [*taken]
+        for option, path in (("--vtu", self.vtu), ("--sensitivities", self.sensitivities)):
+            if path is None:
+                continue
+            if cases != 1:
+                raise InputError(
+                    f"{option} {path}: holds one problem and one route, these are {cases} cases - name one"
+                )
+            if partial is not None:
+                raise InputError(f"{option} {path}: needs the whole gradient - drop --{partial.kind}")
+        if self.sensitivities is not None and routes[0].name != COLUMNS_OF:
+            raise InputError(
+                f"--sensitivities {self.sensitivities}: {routes[0].name} has no du/dp - give --route {COLUMNS_OF}"
+            )
+        for option, path, _ in self._all:
             if path is not None:
                 check_writable(option, path, taken)
                 taken.append(path)
+
+    @property
+    def _all(self) -> tuple[tuple[str, Path | None, Callable[[Path, Sequence[Outcome]], str]], ...]:
+        return (
+            ("--gradient", self.gradient, _gradients),
+            ("--vtu", self.vtu, _fields),
+            ("--sensitivities", self.sensitivities, _sensitivities),
+        )
 
     def write(self, outcomes: Sequence[Outcome]) -> tuple[list[str], list[str]]:
         """Write what was measured. Sentences for what was written or why it was not, and for what went wrong."""
         said: list[str] = []
         failed: list[str] = []
-        for option, path, write in (("--gradient", self.gradient, _gradients), ("--vtu", self.vtu, _fields)):
+        for option, path, write in self._all:
             if path is None or not outcomes:
                 continue
             try:
@@ -60,7 +86,24 @@ def _fields(path: Path, outcomes: Sequence[Outcome]) -> str:
 
     (outcome,) = outcomes
     if outcome.fields is None:
-        status = "gave no fields" if outcome.row["status"] == "ok" else outcome.row["status"]
-        return f"nothing written to {path}: {outcome.row['route']} on {outcome.row['problem']} {status}"
+        return _nothing(path, outcome, "fields")
     vtu.write(path, outcome.fields)
     return f"fields in {path}"
+
+
+def _sensitivities(path: Path, outcomes: Sequence[Outcome]) -> str:
+    from gradient_routes.bench.studies.bill import sensitivity_files
+
+    if path.suffix == ".vtu":
+        return _fields(path, outcomes)
+    (outcome,) = outcomes
+    if outcome.sensitivities is None:
+        return _nothing(path, outcome, "sensitivities")
+    sensitivity_files.write(path, outcome.sensitivities)
+    rows, columns = outcome.sensitivities.values.shape
+    return f"sensitivities, {rows} rows and {columns} columns, in {path}"
+
+
+def _nothing(path: Path, outcome: Outcome, what: str) -> str:
+    status = f"gave no {what}" if outcome.row["status"] == "ok" else outcome.row["status"]
+    return f"nothing written to {path}: {outcome.row['route']} on {outcome.row['problem']} {status}"

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import View
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.render.terminal.tables import named
 
 AXES = ("x", "y", "z")

@@ -1,1 +1,65 @@
 """`routes check`: a verdict on anyone's gradient."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gradient_routes.bench.cases.column import Table
+from gradient_routes.bench.cases.study import Options, Rule, Study
+from gradient_routes.bench.command_options import at_option, solver_options
+from gradient_routes.bench.verification.columns import CHECKS, POINTS
+
+ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
+HTML = click.option(
+    "--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there."
+)
+QUESTION = ("problem", "route", "at")
+TABLES = {"checks": Table(CHECKS, QUESTION), "points": Table(POINTS, QUESTION)}
+
+
+def _registered(given: Options) -> bool:
+    return given["problem"] is not None or given["route"] is not None
+
+
+def _judged(given: Options) -> bool:
+    """Whether there will be a verdict: a problem alone, or a route alone, has its contract checked."""
+    return (given["problem"] is None) == (given["route"] is None)
+
+
+STUDY = Study(
+    name="check",
+    question="Is this gradient right, and if not, why?",
+    help="""
+    \b
+    routes check my_model.py:Model                an object with objective(p), gradient(p) and start
+    routes check --objective m.py:J --gradient m.py:dJ --at p.csv
+    routes check --problem block --route adjoint
+    routes check --problem my_problem.py:Spring   the contract: shapes, derivatives, transposes, work
+
+    The object may offer value_and_gradient(p) instead, and scale, bounds, names, tighten(factor), active_set(p).
+
+    Exit code: 0 agrees, 1 wrong-gradient or inconsistent-discretization, 3 inconclusive, 2 wrong usage.""",
+    options=(
+        click.argument("target", required=False, metavar="[FILE.py:NAME]"),
+        click.option("--objective", metavar="FILE.py:NAME", help="A function J(p), in place of an object."),
+        click.option("--gradient", metavar="FILE.py:NAME", help="A function dJ/dp(p) -> (n_p,), beside --objective."),
+        click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract."),
+        click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract."),
+        at_option,
+        click.option("--budget", type=int, default=200, show_default=True, help="Objective calls at most."),
+        click.option("--accept", type=float, default=0.0, metavar="ERROR", help=ACCEPT),
+        solver_options,
+        click.option("--seed", type=int, default=0, show_default=True, help="Of random directions."),
+        HTML,
+    ),
+    rules=(
+        Rule(("rtol", "max_steps", "linear_solver", "newton"), _registered, "is for registered problems"),
+        Rule(("budget", "accept", "seed", "html", "no_plot", "store"), _judged, "is for verdicts, a contract has none"),
+    ),
+    tables=TABLES,
+    run="gradient_routes.bench.studies.check.measure:run",
+    view="gradient_routes.bench.studies.check.view:show",
+    json="gradient_routes.bench.studies.check.view:as_dict",
+)

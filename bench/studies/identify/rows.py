@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.studies.identify.identifiability import Identified
 from gradient_routes.bench.studies.identify.placement import Placement
 from gradient_routes.problems.errors import InputError

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.render.terminal.tables import MANY
 from gradient_routes.bench.studies.identify.identifiability import Identified
+from gradient_routes.bench.studies.identify.measure import Determined
 from gradient_routes.bench.studies.identify.placement import Placement
 from gradient_routes.bench.studies.kink.view import aligned
 
@@ -26,10 +28,9 @@ LEGEND = (
 )
 
 
-def show(
-    found: Sequence[Identified], rows: Mapping[str, Sequence[Row]], placement: Placement | None, plotted: bool = True
-) -> None:
-    out, first = tables.console(), found[0]
+def show(out: Console, done: Determined, plotted: bool = True) -> None:
+    found, rows, placement = done.experiments, done.tables, done.placement
+    first = found[0]
     wrap = not out.is_terminal
     if plotted:
         out.print(spectra(found, min(out.width, WIDEST)))
@@ -50,6 +51,8 @@ def show(
         tables.show(out, proposal(placement, rows["placement"]))
         for note in placement.notes:
             out.print(Text(note, style="dim"), soft_wrap=wrap)
+    if done.file is not None:
+        out.print(f"fields in {done.file}", style="dim", soft_wrap=True)
 
 
 def spectra(found: Sequence[Identified], width: int) -> Text:

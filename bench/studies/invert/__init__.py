@@ -1,1 +1,79 @@
 """`routes invert`: p estimated from data."""
+
+from __future__ import annotations
+
+import click
+
+from gradient_routes.bench.cases.column import Table
+from gradient_routes.bench.cases.study import Rule, Study
+from gradient_routes.bench.command_options import at_option, routes_option, solver_options
+from gradient_routes.bench.inversion.columns import ESTIMATES, INVERSION, LCURVE, TRADEOFF
+from gradient_routes.bench.studies.options import problem_option
+
+POSITIVES = ["none", "log", "softplus"]
+OPTIMIZERS = ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
+OPTIMIZER = "gauss-newton, levenberg-marquardt and trust use d(S u)/dp; descent is for comparison, adam for --minibatch"
+TOLERANCE = "Ends where |dJ/dp| is this fraction of its value at the start."
+POSITIVE = "How a raw parameter is kept > 0: its logarithm varies, or the argument of softplus."
+ALPHA_SWEEP = "J minimized at COUNT weights of Phi from LEAST to MOST: the L-curve."
+DRAWS = "The same for N draws of the noise: bias and variance against alpha."
+MINIBATCH = "Gradients of K load cases at a time, drawn at random, for adam."
+RATE = "Of adam's steps, in natural changes of p."
+RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
+RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")
+
+STUDY = Study(
+    name="invert",
+    question="Which p minimizes J(p) = 1/2 |S u(p) - d|^2 + alpha Phi(p), with any route as the source of gradients?",
+    help="""Every accepted step is shown as it is taken, with the solves paid so far; with several routes, what each
+    pays to reach a misfit. A line search that fails is diagnosed: J or its gradient.
+
+    \b
+    routes invert --problem bar                                          five moduli of eight, to rounding
+    routes invert --problem 'bar[noise=1e-3]' --alpha-sweep 1e-8 1 9     how much regularization
+    routes invert --problem bar --route adjoint --route fd-central       the same answer, two costs
+
+    Exit code: 0 ended (converged or not, the last line says which), 1 J cannot be evaluated at the start, or --timeout
+    is over, 2 wrong usage, 130 interrupted. What was found by then is shown and kept.""",
+    options=(
+        problem_option,
+        routes_option("adjoint"),
+        at_option,
+        click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help=OPTIMIZER),
+        click.option("--iterations", type=int, default=200, show_default=True, help="At most."),
+        click.option("--tolerance", type=float, default=1e-8, show_default=True, help=TOLERANCE),
+        click.option(
+            "--positive",
+            type=click.Choice(["none", "log", "softplus"]),
+            default="none",
+            show_default=True,
+            help=POSITIVE,
+        ),
+        click.option("--alpha-sweep", type=(float, float, int), metavar="LEAST MOST COUNT", help=ALPHA_SWEEP),
+        click.option("--draws", type=int, metavar="N", help=DRAWS),
+        click.option("--minibatch", type=int, metavar="K", help=MINIBATCH),
+        click.option("--rate", type=float, default=0.1, show_default=True, help=RATE),
+        click.option("--seed", type=int, default=0, show_default=True, help="Of the minibatches."),
+        click.option("--resume", is_flag=True, help=RESUME),
+        solver_options,
+    ),
+    rules=(
+        Rule(("rate",), lambda given: given["optimizer"] == "adam", "is of --optimizer adam"),
+        Rule(("seed",), lambda given: given["minibatch"] is not None, "is of --minibatch"),
+        Rule(
+            ("resume", "minibatch"),
+            lambda given: given["alpha_sweep"] is None,
+            "is of a single inversion, not of an --alpha-sweep",
+        ),
+    ),
+    tables={
+        "inversion": Table(INVERSION, (*RUN, "alpha")),
+        "estimates": Table(ESTIMATES, (*RUN, "alpha")),
+        "lcurve": Table(LCURVE, RUN),
+        "tradeoff": Table(TRADEOFF, RUN),
+    },
+    run="gradient_routes.bench.studies.invert.measure:run",
+    view="gradient_routes.bench.studies.invert.view:show",
+    figures="gradient_routes.bench.studies.invert.figures:section",
+    keeps=True,
+)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render import fields
 from gradient_routes.bench.render.figure import Axis, Figure, Series
 from gradient_routes.bench.render.format import number

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
+from gradient_routes.bench.inversion.invert import Inversion
 from gradient_routes.bench.inversion.lcurve import Point
 from gradient_routes.bench.inversion.tradeoff import Trade
 from gradient_routes.bench.render.format import number
@@ -16,6 +17,13 @@ NO_CORNER = (
     "no corner: the curve bends the other way throughout - with as many parameters as data, the misfit falls on below"
     " the noise"
 )
+
+
+def progress(found: Inversion) -> str:
+    """One minimum, as soon as it is known."""
+    last = found.iterates[-1]
+    paid = f"{last.iteration} iterations, {last.seconds:.3g} s"
+    return f"alpha = {found.alpha:.3g}: misfit {last.misfit:.4g} after {paid}"
 
 
 def curve(points: Sequence[Point], width: int) -> Text:

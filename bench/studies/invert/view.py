@@ -12,11 +12,15 @@ from rich.text import Text
 
 from gradient_routes.bench.inversion.history import Iterate
 from gradient_routes.bench.inversion.invert import Inversion
+from gradient_routes.bench.inversion.one_shot import OneShot
 from gradient_routes.bench.render.format import number, seconds
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
+from gradient_routes.bench.studies.invert import lcurve_view
+from gradient_routes.bench.studies.invert.measure import Begun, Compared, Ended, LCurve, Trades
 from gradient_routes.problems.problem import Array
 
+WIDEST = 100  # columns of a plot
 WIDTHS = {"k": 4, "J": 10, "misfit": 10, "alpha Phi": 10, "|dJ/dp|": 9, "|step|": 8, "fwd": 5, "adj": 5, "time": 8}
 HEADINGS = " ".join(name.rjust(width) for name, width in WIDTHS.items())
 LEGEND = (
@@ -27,6 +31,50 @@ MANY = 40  # parameters; of more, both ends are shown
 COORDINATES = ("x", "y", "z")
 SAME = 1e-6  # of J
 BARS = 12  # characters of the longest bar
+
+
+def show(out: Console, found: object, plots: bool = True) -> None:
+    """What `routes invert` finds, as it comes."""
+    width = min(out.width, WIDEST)
+    match found:
+        case Begun(title, truth):
+            out.print(title, style="bold", soft_wrap=True)
+            heading(out, truth)
+        case Iterate():
+            line(out, found)
+        case Ended(inversion, one_shot):
+            ended(out, inversion, one_shot)
+        case Inversion() if out.is_terminal:
+            out.print(lcurve_view.progress(found), style="dim")
+        case Compared(inversions):
+            out.print()
+            if plots:
+                out.print(history(inversions, width))
+            out.print(costs(inversions))
+            out.print(LEGEND, style="dim", soft_wrap=True)
+            _estimates(out, inversions[-1])
+        case LCurve(points, best):
+            if plots:
+                out.print(lcurve_view.curve(points, width))
+            out.print(lcurve_view.table(points))
+            for remark in lcurve_view.remarks(points):
+                out.print(remark, soft_wrap=True)
+            out.print()
+            _estimates(out, best)
+        case Trades(trades):
+            if plots:
+                out.print(lcurve_view.trade_plot(trades, width))
+            out.print(lcurve_view.trades(trades))
+        case OneShot() | str():
+            out.print(Text(str(found)), soft_wrap=True)
+
+
+def _estimates(out: Console, found: Inversion) -> None:
+    out.print()
+    out.print(estimates(found))
+    picture = cells(found)
+    if picture:
+        out.print(picture)
 
 
 def heading(out: Console, truth: bool) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Guide, Section, Series
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.picking import by_column, grouped, in_order, sorted_by, tabulate

@@ -9,18 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
+from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import RouteSpec
+from gradient_routes.bench.cases.study import Found, Kept, Note, Say
+from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import prices, unaffordable
 from gradient_routes.bench.execution.references import Judge, Judges
 from gradient_routes.bench.studies.kink.event import NEAR, Event, Kink, Side, Slope, Stencil, Visit
 from gradient_routes.bench.studies.kink.ray import Gradients, Ray, bisect
-from gradient_routes.bench.studies.kink.rounding import is_rounded
+from gradient_routes.bench.studies.kink.rounding import GRADIENTS, Trade, is_rounded, trade, yielding
+from gradient_routes.bench.studies.kink.rows import rows
+from gradient_routes.bench.studies.options import built, one_problem, routes_of
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Offers, Problem
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Route
 
 ONE_SIDED = float(np.finfo(np.float64).eps) ** 0.5  # step of one-sided quotients, relative to s
@@ -30,6 +37,57 @@ CHOICES = (
     "choose a problem that has, bar[stop=penalty] or bar[stop=multiplier] say, or one rounded, bar[stop=softplus] or"
     " bar[stop=quadratic]"
 )
+
+
+def run(
+    say: Say,
+    *,
+    selector: str,
+    routes: Sequence[str],
+    at: str,
+    s_range: tuple[float, float],
+    points: int,
+    budget: float,
+    solver: Solver,
+    kept: Path | None = None,
+) -> int:
+    low, high = s_range
+    if not 0 < low < high < math.inf:
+        raise InputError(f"--range {low:g} {high:g} - give two factors, 0 < least < largest")
+    if points < 2:
+        raise InputError(f"--points {points} - give at least 2")
+    checked(budget)
+    specs = routes_of(routes or ["all"], say)
+    ray = Ray(*built(one_problem(selector), at), solver)
+    failure = traded = None
+    with np.errstate(all="ignore"):
+        swept = kink(ray, specs, np.geomspace(low, high, points).tolist(), budget)
+        try:
+            traded = _traded(swept, specs if routes else case.routes(["adjoint"]), budget)
+        except RoutesError as unsolved:
+            failure = unsolved
+    say(Found((selector, swept, traded)))
+    for row in rows(swept, traded, {"problem": selector, "at": at}):
+        say(Kept("kink", row))
+    if swept.rounded and not swept.failed and traded is None and failure is None:
+        say(Note("kink: the cost of the width is left out: no route runs for it - name another with --route"))
+    if failure is not None:
+        say(Note(f"kink: the cost of the contact law is not known: {failure}"))
+    return 1 if swept.failed or failure is not None else 0
+
+
+def _traded(swept: Kink, specs: list[RouteSpec], budget: float) -> Trade | None:
+    """What a stop that yields costs, by the first of the routes that runs, an exact one before others.
+
+    None where there is no such stop or route, or nothing to compare. Raises what the solve of exact contact raises.
+    """
+    ray, stop = swept.ray, yielding(swept.ray.problem)
+    if stop is None or swept.failed or (swept.event is None and not swept.rounded):
+        return None
+    for spec in sorted(specs, key=lambda spec: spec.route.accuracy > 0.0):
+        if why_not(ray, spec, 1.0, GRADIENTS, budget) is None:
+            return trade(ray, stop, spec, swept.visits[0].s, swept.visits[-1].s)
+    return None
 
 
 def kink(ray: Ray, routes: Sequence[RouteSpec], s: Sequence[float], budget: float = math.inf) -> Kink:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from gradient_routes.bench.cases.row import Row
-from gradient_routes.bench.studies.columns import KINK
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.studies.kink.columns import KINK
 from gradient_routes.bench.studies.kink.event import Kink
 from gradient_routes.bench.studies.kink.rounding import Trade, width_of
 

@@ -11,9 +11,20 @@ from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.panel import panel
 from gradient_routes.bench.render.terminal.tables import show
 from gradient_routes.bench.studies.kink.event import EXACT, NEAR, Kink, Slope, in_words
+from gradient_routes.bench.studies.kink.rounding import Trade
 
 WIDEST = 100  # columns of a plot
 ROUNDED = 1.0 + 1e-9  # s is
+
+
+def show_study(out: Console, found: tuple[str, Kink, Trade | None], plots: bool = True) -> None:
+    """The selector of the problem, what was found on it, and what a rounded law costs where there is one."""
+    problem, kink, trade = found
+    show_kink(out, kink, problem, plots)
+    if trade is not None:
+        from gradient_routes.bench.studies.kink.rounding_view import show_trade
+
+        show_trade(out, trade, plots)
 
 
 def show_kink(out: Console, kink: Kink, problem: str, plots: bool = True) -> None:

@@ -1,1 +1,49 @@
 """`routes scaling`: cost against problem size."""
+
+from __future__ import annotations
+
+import click
+
+from gradient_routes.bench.cases.column import Table
+from gradient_routes.bench.cases.study import Study
+from gradient_routes.bench.command_options import at_option, routes_option, solver_options
+from gradient_routes.bench.execution.options import limit_options
+from gradient_routes.bench.studies.scaling.columns import BREAK_EVEN, SCALING_FITS
+
+PROBLEM = "NAME, whose n grows, or a grid of sizes: 'NAME[n=8|64|512]'."
+FROM = "n to begin with. [that of the problem]"
+GROWTH = "Unknowns of a level over those of the level before."
+BUDGET = "End of a route: gradients predicted to take more seconds; inf forces them."
+QUESTION = ("problem", "problem_options", "at", "route", "route_options")
+
+STUDY = Study(
+    name="scaling",
+    question="How do time, memory, work grow with unknowns, parameters and iterations, and how far does a route get?",
+    help="""A route ends where the next size is over the budget, or reaches another cap. On one affordable size tangent,
+    finite differences and adjoint are then timed in turn on 1, 2, 4 ... of the parameters: the n_p from which one is
+    cheaper is fitted, and shown beside what the cost model predicts. A grid of iterations is fitted as well:
+    --route 'unrolled-ad[iterations=10|100|1000]'.
+
+    Exit code: 0 measured, 1 no route could be measured, 2 wrong usage, 130 interrupted.""",
+    options=(
+        click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM),
+        routes_option("all"),
+        at_option,
+        click.option("--from", "first", type=int, metavar="N", help=FROM),
+        click.option("--growth", type=float, default=4.0, show_default=True, help=GROWTH),
+        click.option("--levels", type=int, default=10, show_default=True, help="Sizes at most."),
+        click.option("--budget", type=float, default=10.0, show_default=True, help=BUDGET),
+        click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time."),
+        solver_options,
+        limit_options("a case", 600.0),
+    ),
+    tables={
+        "scaling_fits": Table(SCALING_FITS, (*QUESTION, "quantity", "against")),
+        "break_even": Table(BREAK_EVEN, (*QUESTION, "other", "other_options")),
+    },
+    run="gradient_routes.bench.studies.scaling.run:run",
+    view="gradient_routes.bench.studies.scaling.view:show",
+    figures="gradient_routes.bench.studies.scaling.figures:section",
+    keeps=True,
+    confined=False,
+)

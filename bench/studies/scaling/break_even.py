@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.judged import said
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec, point
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices
+from gradient_routes.bench.studies.judged import said
 from gradient_routes.bench.studies.scaling.climbing import Series
 from gradient_routes.bench.studies.scaling.crossing import FEWEST, Crossing, Line, cheaper, crossing, exact, line
 from gradient_routes.bench.studies.scaling.race import MOST_PARAMETERS, NUMBERS, ROUNDS, Race, doublings, race
@@ -37,7 +37,7 @@ LONGER = 20.0  # rounds of a race last so many times --min-time
 
 @dataclass(frozen=True)
 class BreakEven:
-    """Two routes, seconds = fixed + each m of both, and where they cross. Columns as in bench.studies.columns."""
+    """Two routes, seconds = fixed + each m of both, and where they cross. Fields are columns of its table."""
 
     problem: str
     problem_options: dict[str, object]

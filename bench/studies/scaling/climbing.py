@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.cases.row import LIMITED, Row
+from gradient_routes.bench.cases.row import LIMITED
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.studies.scaling.sizes import Sizes
 from gradient_routes.bench.units import duration

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gradient_routes.bench.cases.row import Column, Row
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Guide, Section, Series
 from gradient_routes.bench.render.format import number, seconds
 from gradient_routes.bench.render.picking import grouped, in_order, sorted_by, tabulate, text

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.cases.row import Row
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution.executors.interrupt import Interrupt
+from gradient_routes.bench.execution.isolation.signals import Interrupt
 from gradient_routes.bench.execution.sweep import run
 from gradient_routes.bench.studies.scaling.break_even import BreakEven, Racing, break_even
 from gradient_routes.bench.studies.scaling.climbing import Climb, Measure, Series
@@ -28,7 +28,7 @@ COUNTED = ("tape_bytes", "factor_bytes", "iterations", *WORK)  # whole numbers w
 
 @dataclass(frozen=True)
 class Growth:
-    """One quantity of one route over one abscissa. Columns as in bench.studies.columns."""
+    """One quantity of one route over one abscissa. Fields are columns of its table."""
 
     problem: str
     problem_options: dict[str, object]

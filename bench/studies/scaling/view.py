@@ -8,7 +8,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.execution.cost_model import LEGEND, summary
 from gradient_routes.bench.render.format import bytes_, ratio, seconds
 from gradient_routes.bench.render.terminal import tables
@@ -21,11 +21,13 @@ from gradient_routes.bench.studies.scaling.measure import Scaling, abscissa, abs
 from gradient_routes.routes.tally import Work
 
 WIDE = 130  # columns from which plots stand side by side
-BILLS = f"time: one gradient, x fwd: in forward solves; memory: peak of one call; tape: kept by AD\nwork: {LEGEND}"
+BILLS = f"""\
+time: one gradient; cost / forward solve: that time over a forward solve's
+memory: peak of one call; tape: stored by AD for its backward sweep
+work: {LEGEND}"""
 
 
-def show(done: Scaling, plotted: bool = True) -> None:
-    out = tables.console()
+def show(out: Console, done: Scaling, plotted: bool = True) -> None:
     if plotted and any(series.rows for series in done.series):
         out.print(plots(done, out.width))
         out.print()
@@ -62,7 +64,7 @@ def bills(done: Scaling) -> Table:
     """One line a case under the line of its route."""
     out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     out.add_column("route\n  size", overflow="fold", min_width=10)
-    for heading in ("n_u", "n_p", "time", "x fwd", "memory"):
+    for heading in ("n_u", "n_p", "time", "cost /\nforward\nsolve", "memory"):
         out.add_column(heading, justify="right", no_wrap=True)
     taped = any(row["tape_bytes"] for row in done.rows)
     if taped:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Section, Series
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.picking import bare, by_column, grouped, in_order, real, sorted_by, tabulate

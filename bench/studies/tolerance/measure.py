@@ -10,21 +10,29 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from benchmarks.judged import Bench, said
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.study import Found, Kept, Say
+from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
+from gradient_routes.bench.studies.judged import Bench, said
+from gradient_routes.bench.studies.options import one_problem, routes_of
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, norm
 from gradient_routes.routes.route import Options, Result, Route
-from gradient_routes.routes.solvers.factorization import LinearSolver
+from gradient_routes.routes.solvers.iterative import descent, krylov
+from gradient_routes.routes.solvers.registry import linear_solver as named
 
-NOT_SHARED = ("definite", "interrupted", "points")  # by rows
+Swept = Literal["forward", "adjoint", "both"]
+TIGHT = 1e-12  # tolerance of the solves that are not swept
+NOT_SHARED = ("jumps", "interrupted", "points")  # by rows
 FEW = 32  # unknowns up to which conjugate gradients are exact before they are accurate
 
 
@@ -59,7 +67,7 @@ def decades(loosest: float, tightest: float, per_decade: int = 1) -> tuple[float
 
 @dataclass(frozen=True)
 class Point:
-    """A route at one pair of tolerances; skipped as a whole, it has none. Columns as in bench.studies.columns."""
+    """A route at one pair of tolerances; skipped as a whole, it has none. Fields are columns of its table."""
 
     route: str
     route_options: Options
@@ -79,7 +87,7 @@ class Point:
 class Tolerance:
     """The study: its points and what they share.
 
-    definite     R_u is positive definite: descent ends on it
+    jumps        R_u is positive definite, so that steepest descent would converge, and the solver is a less even one
     interrupted  by Ctrl-C, after these points
     """
 
@@ -90,7 +98,7 @@ class Tolerance:
     sweep: str
     n_state: int
     n_param: int
-    definite: bool = field(repr=False)
+    jumps: bool = field(repr=False)
     interrupted: bool = field(repr=False)
     points: tuple[Point, ...] = field(repr=False)
 
@@ -101,12 +109,58 @@ class Tolerance:
         return [shared | asdict(point) for point in self.points]
 
 
+def run(
+    say: Say,
+    *,
+    selector: str,
+    routes: Sequence[str],
+    at: str,
+    loosest: float,
+    tightest: float,
+    per_decade: int,
+    sweep: Swept | None,
+    rtol: float | None,
+    adjoint_rtol: float | None,
+    linear_solver: str | None,
+    budget: float,
+    kept: Path | None = None,
+) -> None:
+    """Ctrl-C ends the study, not what it has measured."""
+    problem, specs = one_problem(selector), routes_of(routes, say)
+    tolerances = sweep_of(decades(loosest, tightest, per_decade), sweep, rtol, adjoint_rtol)
+    done = tolerance(problem, specs, tolerances, at, linear_solver, checked(budget))
+    say(Found(done))
+    for row in done.rows:
+        say(Kept("tolerance", row))
+    if done.interrupted:
+        raise KeyboardInterrupt
+
+
+def sweep_of(
+    tolerances: tuple[float, ...], sweep: Swept | None, rtol: float | None, adjoint_rtol: float | None
+) -> Sweep:
+    """Which tolerance varies and where the other stays. Raises InputError."""
+    for name, value in (("--rtol", rtol), ("--adjoint-rtol", adjoint_rtol)):
+        if value is not None and not 0.0 < value < 1.0:
+            raise InputError(f"{name} {value:g} - give a tolerance between 0 and 1")
+    sweep = sweep or ("both" if adjoint_rtol is None else "forward")
+    if rtol is not None and sweep != "adjoint":
+        raise InputError(f"--rtol {rtol:g} with the forward tolerance swept - add --sweep adjoint or drop it")
+    if adjoint_rtol is not None and sweep != "forward":
+        raise InputError(f"--adjoint-rtol {adjoint_rtol:g} with the adjoint's swept - take --sweep forward or drop it")
+    return Sweep(
+        tolerances,
+        forward=(rtol or TIGHT) if sweep == "adjoint" else None,
+        adjoint=(adjoint_rtol or TIGHT) if sweep == "forward" else None,
+    )
+
+
 def tolerance(
     problem: ProblemSpec,
     routes: Sequence[RouteSpec],
     sweep: Sweep,
     at: str = "start",
-    linear_solver: LinearSolver | None = None,
+    linear_solver: str | None = None,
     budget: float = 60.0,
 ) -> Tolerance:
     """Every route at every tolerance, judged by what is found directly at a tight one.
@@ -135,23 +189,23 @@ def tolerance(
         sweep.name,
         bench.problem.n_state,
         len(bench.p),
-        bench.problem.structure == "spd",
+        bench.problem.structure == "spd" and not named(linear_solver).gradual,
         interrupted,
         tuple(points),
     )
 
 
-def default_solver(problem: Problem) -> LinearSolver:
+def default_solver(problem: Problem) -> str:
     """One whose tolerance means something: on a linear problem a direct solver is exact after one step."""
     if not problem.linear:
-        return "auto"
-    return "descent" if problem.n_state <= FEW else "krylov"
+        return Solver.linear_solver
+    return descent.name if problem.n_state <= FEW else krylov.name
 
 
 class Experiment:
     """One problem at one p under a sweep."""
 
-    def __init__(self, bench: Bench, sweep: Sweep, linear_solver: LinearSolver, budget: float) -> None:
+    def __init__(self, bench: Bench, sweep: Sweep, linear_solver: str, budget: float) -> None:
         self.bench, self.problem, self.p = bench, bench.problem, bench.p
         self.sweep, self.linear_solver, self.budget = sweep, linear_solver, budget
         self._priced: Prices | None = None
@@ -171,7 +225,7 @@ class Experiment:
 
     def _alike(self, spec: RouteSpec) -> Options:
         """Left open, the iteration that unrolled AD differentiates is as slow as the solver's, where there is one."""
-        if self.linear_solver != "descent" or spec.options.get("inner", "") is not None:
+        if not named(self.linear_solver).gradual or spec.options.get("inner", "") is not None:
             return spec.options
         options = spec.options | {"inner": "richardson"}
         return options if spec.route.objection(self.problem, **options) is None else spec.options

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
+from gradient_routes.bench.studies.tolerance.measure import Tolerance
 
 SWEPT = {
     "both": "tolerance of forward and adjoint solves",
@@ -28,9 +30,8 @@ LEGEND = (
 )
 
 
-def show(rows: Sequence[Row], plotted: bool = True, definite: bool = False) -> None:
-    """`definite` is R_u of the problem: what descent is for."""
-    out = tables.console()
+def show(out: Console, done: Tolerance, plotted: bool = True) -> None:
+    rows = done.rows
     measured = [row for row in rows if row["rtol"] is not None]
     if plotted and measured:
         out.print(curves(measured, out.width))
@@ -40,7 +41,7 @@ def show(rows: Sequence[Row], plotted: bool = True, definite: bool = False) -> N
         out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)
-    for line in remarks(rows, definite):
+    for line in remarks(rows, done.jumps):
         out.print(line, soft_wrap=not out.is_terminal)
 
 
@@ -112,7 +113,7 @@ def _cell(row: Row) -> str:
     return (number(row["gradient_error"], 2) or "unknown") if row["status"] == "ok" else row["status"]
 
 
-def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
+def remarks(rows: Sequence[Row], jumps: bool = False) -> list[Text]:
     """Reasons of what was skipped, and of what failed at which tolerances."""
     at: dict[tuple[str, str, str], list[float]] = {}
     for row in rows:
@@ -127,7 +128,7 @@ def remarks(rows: Sequence[Row], definite: bool = False) -> list[Text]:
         )
         for (status, reason, _), where in at.items()
     ]
-    slowly = SLOWLY if definite and rows[0]["linear_solver"] != "descent" else ""
+    slowly = SLOWLY if jumps else ""
     return lines + ([Text(f"note: {JUMPED}{slowly}", style="italic")] if _jumped(rows) else [])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Guide, Section, Series
 from gradient_routes.bench.render.format import bytes_
 from gradient_routes.bench.render.picking import grouped, sorted_by, tabulate

@@ -10,15 +10,19 @@ import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
-from benchmarks.judged import TIGHT, Bench, said
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import ProblemSpec
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.study import Found, Kept, Say
+from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import price_of, unaffordable
 from gradient_routes.bench.execution.timing import rounds
+from gradient_routes.bench.studies.judged import TIGHT, Bench, said
+from gradient_routes.bench.studies.options import one_problem
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Gradient, Options, Result, Route
@@ -94,6 +98,25 @@ class Unrolling:
             "unrolling": [of_iterates | asdict(iterate) for iterate in self.iterates],
             "unrolling_fits": [shared | asdict(curve) for curve in self.curves],
         }
+
+
+def run(
+    say: Say,
+    *,
+    selector: str,
+    at: str,
+    inner: str | None,
+    checkpoint: int | None,
+    max_iterations: int,
+    within: float,
+    budget: float,
+    kept: Path | None = None,
+) -> None:
+    done = unrolling(one_problem(selector), at, inner, checkpoint, max_iterations, within, checked(budget))
+    say(Found(done))
+    for table, rows in done.tables.items():
+        for row in rows:
+            say(Kept(table, row))
 
 
 def unrolling(

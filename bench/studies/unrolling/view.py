@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.console import RenderableType
+from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, plot
+from gradient_routes.bench.studies.unrolling.measure import Unrolling
 from gradient_routes.bench.units import size
 
 WIDE = 130  # columns from which plots stand side by side
@@ -22,8 +23,8 @@ LEGEND = (
 )
 
 
-def show(iterates: Sequence[Row], curves: Sequence[Row], plotted: bool = True) -> None:
-    out = tables.console()
+def show(out: Console, done: Unrolling, plotted: bool = True) -> None:
+    iterates, curves = done.tables["unrolling"], done.tables["unrolling_fits"]
     if plotted:
         out.print(plots(iterates, out.width))
         out.print()

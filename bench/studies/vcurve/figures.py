@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from gradient_routes.bench.cases.row import Row
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.figure import Axis, Facet, Figure, Section, Series
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.picking import grouped, sorted_by, tabulate

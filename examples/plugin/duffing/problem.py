@@ -6,8 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem
+from gradient_routes import Array, InputError, Linearization, Offers, Parameters, Problem
 
 
 class Duffing(Problem):

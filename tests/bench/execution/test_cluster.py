@@ -414,7 +414,9 @@ def test_without_dask_it_is_said_how_to_install_it(folder: Path) -> None:
 def test_the_slurm_example_asks_for_workers() -> None:
     file = ROOT / "examples" / "cluster" / "slurm.py"
     py_compile.compile(str(file), doraise=True)
+    handler = signal.getsignal(signal.SIGINT)
     pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is not installed")
+    signal.signal(signal.SIGINT, handler)  # importing it replaces Python's handler: other tests would not see Ctrl-C
     spec = importlib.util.spec_from_file_location("slurm", file)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)

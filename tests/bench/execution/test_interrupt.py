@@ -9,7 +9,7 @@ from queue import SimpleQueue
 
 import pytest
 
-from gradient_routes.bench.execution.executors.interrupt import Interrupt
+from gradient_routes.bench.execution.isolation.signals import Interrupt
 
 
 @pytest.fixture(autouse=True)

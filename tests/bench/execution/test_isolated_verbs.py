@@ -6,16 +6,17 @@ import json
 import signal
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from commands import FAULTY, Shell, ended, eventually, faulty
+from commands import FAULTY, Shell, ended, eventually, faulty, sigint_ignored
 
-from gradient_routes.bench.cli import KEEPING
-from gradient_routes.bench.execution import limited
+from gradient_routes.bench.cases.registry import studies
+from gradient_routes.bench.command_options import FINISHED
 from gradient_routes.bench.execution.isolation import process as watching
-from gradient_routes.bench.execution.limited import FINISHED
 from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies import command
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -33,7 +34,7 @@ def test_every_verb_ends_at_its_limit(started: Shell) -> None:
     running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
     for verb, process in running.items():
         ran = ended(process)
-        finished = f"; {FINISHED}" if verb in KEEPING else ""
+        finished = f"; {FINISHED}" if studies()[verb].keeps else ""
         says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less{finished}\n"
         assert (ran.code, ran.out, ran.err) == (1, "", says)
     names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
@@ -68,8 +69,7 @@ def late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         def monotonic() -> float:
             return time.monotonic() + (7200.0 if file.exists() and len(file.read_text()) > 9 else 0.0)
 
-    for module in (limited, watching):
-        monkeypatch.setattr(module, "time", Late)
+    monkeypatch.setattr(watching, "time", Late)
 
 
 @pytest.mark.parametrize("verb", ENDLESS)
@@ -116,10 +116,15 @@ def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
         assert ran.out == ""
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-@pytest.mark.parametrize("model", ["Sleeping", "Stubborn"])
-def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str) -> None:
-    process = started.start("check", f"{FAULTY}:{model}")
+@pytest.mark.parametrize(
+    ("model", "name", "ignored"),
+    [(model, name, False) for model in ("Sleeping", "Stubborn") for name in ("SIGINT", "SIGTERM")]
+    + [("Sleeping", "SIGINT", True)],
+)
+def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str, ignored: bool) -> None:
+    """Also where it was started with SIGINT ignored, as what shells start in the background is."""
+    with sigint_ignored() if ignored else nullcontext():
+        process = started.start("check", f"{FAULTY}:{model}")
     started.asleep()
     process.send_signal(signal.Signals[name])
     ran = ended(process)
@@ -144,7 +149,7 @@ def test_a_verb_that_does_not_react_is_killed_and_says_nothing_of_what_it_has(
     late: None, cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "deaf.py").write_text(COUNTED + DEAF)
-    monkeypatch.setattr(limited, "LAST", 0.5)
+    monkeypatch.setattr(command, "LAST", 0.5)
     ran = cli("invert", "--problem", "deaf.py:Deaf", "--isolate", "--no-plot", *ENDLESS["invert"])
     told = "invert: timeout: after 3600 s of --timeout - raise the limit, or ask for less"
     assert (ran.code, ran.err) == (1, f"routes: {told}\n")

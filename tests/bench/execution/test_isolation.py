@@ -17,7 +17,7 @@ from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution.executors import isolated
+from gradient_routes.bench.execution.isolation import line
 from gradient_routes.bench.execution.isolation import process as watching
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.pruning import Pruning
@@ -41,7 +41,7 @@ class Clock:
         self.sleep = time.sleep
         for name, value in {MARK: folder, "ROUTES_TEST_REACHED": self.folder}.items():
             patch.setenv(name, str(value))
-        for module in (watching, isolated):
+        for module in (watching, line):
             patch.setattr(module, "time", self)
 
     def monotonic(self) -> float:
@@ -310,7 +310,7 @@ def test_nothing_beside_a_file_or_in_the_folder_hides_a_library(tmp_path: Path) 
 
 IMPORTED = """
 import ctypes, os, sys
-if "gradient_routes.bench.execution.worker" in sys.orig_argv:
+if "gradient_routes.bench.execution.isolation.worker" in sys.orig_argv:
     {}
 from faulty import Faulty
 """
@@ -380,7 +380,7 @@ def test_an_allocation_that_superlu_misses_is_no_singular_matrix(monkeypatch: py
     import scipy.sparse
     import scipy.sparse.linalg
 
-    from gradient_routes.bench.cases.outcome import status_of
+    from gradient_routes.bench.cases.status import status_of
     from gradient_routes.routes.solvers.factorization import Factorizer
 
     def splu(A: object) -> None:

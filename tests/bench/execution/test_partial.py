@@ -17,9 +17,9 @@ from gradient_routes.bench.execution import references as accuracy
 from gradient_routes.bench.execution.case_context import Workbench
 from gradient_routes.bench.execution.executors.in_process import Here
 from gradient_routes.bench.execution.executors.running import alone
+from gradient_routes.bench.execution.measure_job import Measure
 from gradient_routes.bench.execution.measurement import begun_row
 from gradient_routes.bench.execution.references import Judge, Judges, error
-from gradient_routes.bench.execution.worker import Measure
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import DomainError, InputError

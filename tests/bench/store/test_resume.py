@@ -153,13 +153,16 @@ def test_versions_of_libraries_and_of_the_harness_are_in_the_key(monkeypatch: py
     assert content(monkeypatch, HARNESS=keys.HARNESS + 1) != before
 
 
+FLOOR = "gradient_routes/problems"
+BAR = f"{FLOOR}/bar.py"
+
+
 def test_the_source_of_a_problem_is_all_that_it_imports_of_its_own() -> None:
     found = {
-        path.relative_to(sources.HERE)
-        for path in sources.closure(sources.HERE / "problems" / "bar.py", sources.HERE, "problems")
+        path.relative_to(sources.HERE) for path in sources.closure(sources.HERE / BAR, sources.HERE, "gradient_routes")
     }
     names = {str(path) for path in found}
-    assert {"problems/bar.py", "problems/problem.py", "problems/matrices/tridiagonal.py"} <= names
+    assert {BAR, f"{FLOOR}/problem.py", f"{FLOOR}/matrices/tridiagonal.py"} <= names
     assert not any(name.startswith("bench/") for name in names), "the harness has a number of its own"
     assert "problems/fem/assembly_jax.py" not in names
 

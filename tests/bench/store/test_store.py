@@ -15,11 +15,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from commands import ROOT, shell
+from commands import shell
 
 from gradient_routes.bench.cases.row import COLUMNS, SAMPLES, STORED, empty_row
 from gradient_routes.bench.cases.samples import Samples
-from gradient_routes.bench.render.schema import markdown
 from gradient_routes.bench.store.store import SCHEMA, Store
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.tally import KINDS
@@ -225,9 +224,6 @@ def test_an_empty_file_is_an_empty_store(tmp_path: Path) -> None:
 
 
 def test_every_column_is_documented() -> None:
-    assert (ROOT / "results" / "README.md").read_text() == markdown(), (
-        "run python -m gradient_routes.bench.render.schema > results/README.md"
-    )
     assert all(column.meaning for column in (*COLUMNS, *STORED, *SAMPLES))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -11,13 +12,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gradient_routes.bench.cases.case import problems
 from gradient_routes.bench.execution import references as accuracy
 from gradient_routes.bench.store.store import SCHEMA, Store
 from gradient_routes.bench.studies.bill.files import Files
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
+from gradient_routes.problems.problem import Problem
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver, State
 
 RUN = "run --min-time 0 --problem".split()
 
@@ -105,7 +109,91 @@ def test_a_route_without_an_adjoint_state_leaves_it_out(cli) -> None:
     assert set(meshio.read("f.vtu").point_data) == {"u"}
 
 
+def central_differences(problem: Problem, of: Callable[[State], np.ndarray]) -> np.ndarray:
+    """d of / dp (m, n_p) by forward solves at p +- h e_i."""
+    model, p = Model(problem, Solver(rtol=1e-13)), problem.parameters.start
+    columns = []
+    for i, size in enumerate(problem.parameters.natural(p)):
+        step = np.zeros_like(p)
+        step[i] = 1e-5 * size
+        columns.append((of(model.solve(p + step)) - of(model.solve(p - step))) / (2 * step[i]))
+    return np.stack(columns, axis=1)
+
+
+SELECTED = "bar[n=6,sensors=2,5,alpha=0.1]"
+
+
+def test_sensitivities_of_the_state_equal_central_differences(cli) -> None:
+    assert cli(*RUN, SELECTED, "--route", "tangent", "--sensitivities", "s.csv").code == 0
+    table, bar = pd.read_csv("s.csv", index_col="du_dp"), Bar(n=6, sensors=[2, 5], alpha=0.1)
+    assert list(table) == [bar.parameters.label(i) for i in range(6)]
+    assert list(table.index) == [f"u_{i}" for i in range(1, 7)]
+    np.testing.assert_allclose(table, central_differences(bar, lambda state: state.u), rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize("selector", [SELECTED, "block[n=2,unknown=shape,markers=3]"])
+def test_sensitivities_of_the_data_equal_central_differences(cli, selector: str) -> None:
+    ran = cli(*RUN, selector, "--route", "tangent", "--sensitivities", "s.npz", "--sensitivities-of", "data",
+              "--columns", "5,1-2")  # fmt: skip
+    assert ran.code == 0, ran.err
+    (spec,) = problems([selector])
+    problem = spec()
+
+    def readings(state: State) -> np.ndarray:
+        seen = problem.observation(state.u, state.p)
+        assert seen is not None
+        return np.asarray(seen.predicted / seen.weight)
+
+    with np.load("s.npz") as kept:
+        assert list(kept["parameters"]) == [problem.parameters.label(i) for i in (4, 0, 1)]
+        assert len(kept["rows"]) == len(kept["dSu_dp"])
+        expected = central_differences(problem, readings)[:, [4, 0, 1]]
+        np.testing.assert_allclose(kept["dSu_dp"], expected, rtol=1e-6, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    "selector", ["block[n=2]", "block[n=2,cases=2]", "block[n=2,unknown=load,load=displacement]", "advection[n=4]"]
+)
+def test_columns_on_the_mesh_equal_differences_of_its_fields(cli, selector: str) -> None:
+    ran = cli(*RUN, selector, "--route", "tangent", "--vtu", "f.vtu", "--columns", "1")
+    assert ran.code == 0, ran.err
+    mesh = meshio.read("f.vtu")
+    (spec,) = problems([selector])
+    problem = spec()
+    p, h = problem.parameters.start, 1e-5
+    step = h * np.eye(len(p))[0] * problem.parameters.natural(p)
+    model = Model(problem, Solver(rtol=1e-13))
+    above, below = (problem.fields(q, model.solve(q).u, None, 0 * p).point_data for q in (p + step, p - step))
+    names = [name for name in above if name.startswith("u")]
+    assert {name for name in mesh.point_data if name.startswith("du_dp")} == {f"du_dp_1{n[1:]}" for n in names}
+    for name in names:
+        expected = (above[name] - below[name]) / (2 * step[0])
+        found = mesh.point_data[f"du_dp_1{name[1:]}"]
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+        assert np.abs(found).max() > 0
+
+
+def test_a_mesh_of_sensitivities_has_every_column(cli) -> None:
+    ran = cli(*RUN, "block[n=1]", "--route", "tangent", "--sensitivities", "s.vtu")
+    assert (ran.code, "fields in s.vtu" in ran.out) == (0, True)
+    assert set(meshio.read("s.vtu").point_data) == {"u", "du_dp_1"}
+    assert cli(*RUN, "block[n=1]", "--route", "tangent", "--vtu", "f.vtu").code == 0
+    assert set(meshio.read("f.vtu").point_data) == {"u"}
+
+
 WRONG = {
+    "another route": ("bar --route adjoint --sensitivities s.csv", "adjoint has no du/dp - give --route tangent"),
+    "a suffix": ("bar --route tangent --sensitivities s.txt", "suffix '.txt' - name a file .csv, .npz, .vtu"),
+    "columns of two": ("bar --route all --sensitivities s.csv", "these are 7 cases - name one"),
+    "data on a mesh": ("block --route tangent --sensitivities s.vtu --sensitivities-of data", "name a .csv or .npz"),
+    "no mesh for columns": ("bar --route tangent --sensitivities s.vtu", "has no mesh to write fields on"),
+    "a column too many": ("bar --route tangent --sensitivities s.csv --columns 9", "bar has 8 parameters - choose 1"),
+    "columns that are none": ("bar --route tangent --sensitivities s.csv --columns 3-x", "'3-x' is not a number or a"),
+    "no columns": ("bar --route tangent --sensitivities s.csv --columns 5-3", "no parameter - write 1,5-8"),
+    "columns of nothing": ("bar --route tangent --columns 1", "--columns: is of --sensitivities"),
+    "data of nothing": ("bar --route tangent --sensitivities-of data", "is of --sensitivities - leave it out"),
+    "sensitivities of a part": ("bar --route tangent --sensitivities s.csv --components 2", "drop --components"),
+    "two in one": ("bar --route tangent --gradient s.csv --sensitivities s.csv", "is another file of this run"),
     "a folder": ("bar --route adjoint --gradient .", "--gradient .: Is a directory"),
     "a missing folder": ("bar --route adjoint --gradient no/g.csv", "No such file or directory"),
     "unwritable": ("bar --route adjoint --gradient /proc/g.csv", "--gradient /proc/g.csv: "),

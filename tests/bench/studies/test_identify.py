@@ -10,8 +10,8 @@ import pytest
 from conftest import relative_error, somewhere, zoo
 
 from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.registry import study_tables
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import STUDIES
 from gradient_routes.bench.studies.identify import identifiability, posterior
 from gradient_routes.bench.studies.identify.identifiability import Identified, identify, varied
 from gradient_routes.bench.studies.identify.placement import greedy, place
@@ -290,7 +290,7 @@ def test_the_command_prints_rows_and_keeps_them(cli) -> None:
     ran = cli("identify", *asked.split())
     assert (ran.code, ran.err) == (0, "")
     for row in ran.rows:
-        assert row.keys() - {"table"} == {c.name for c in STUDIES[row["table"]]}
+        assert row.keys() - {"table"} == {c.name for c in study_tables()[row["table"]].columns}
     for name in TABLES:
         _, kept = Store(Path("results/routes.sqlite")).table(name)
         assert len(kept) == sum(row["table"] == name for row in ran.rows) > 0

@@ -14,7 +14,7 @@ from test_routes import ids
 from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.execution.references import error
 from gradient_routes.bench.render.terminal.panel import panel
-from gradient_routes.bench.studies.columns import KINK
+from gradient_routes.bench.studies.kink.columns import KINK
 from gradient_routes.bench.studies.kink.event import Kink
 from gradient_routes.bench.studies.kink.measure import kink
 from gradient_routes.bench.studies.kink.ray import Ray

@@ -15,12 +15,12 @@ from scipy.optimize import minimize_scalar
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.registry import study_tables
 from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution import sweep as runner
 from gradient_routes.bench.execution import timing
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import STUDIES
 from gradient_routes.bench.studies.scaling import break_even_view as break_even
 from gradient_routes.bench.studies.scaling import race
 from gradient_routes.bench.studies.scaling.climbing import extrapolated
@@ -338,11 +338,11 @@ def test_the_command_prints_rows_and_keeps_them(cli) -> None:
     options = ("--min-time", "0", "--json")
     ran = cli("scaling", "--problem", "bar[n=2|4|8]", "--route", "adjoint", "--route", "tangent", *options)
     assert (ran.code, ran.err) == (0, "")
-    tables = {name: [row for row in ran.rows if row["table"] == name] for name in ("cases", *STUDIES)}
+    tables = {name: [row for row in ran.rows if row["table"] == name] for name in ("cases", *study_tables())}
     assert len(tables["cases"]) == 6
     for name in ("scaling_fits", "break_even"):
         assert tables[name]
-        assert all(row.keys() - {"table"} == {c.name for c in STUDIES[name]} for row in tables[name])
+        assert all(row.keys() - {"table"} == {c.name for c in study_tables()[name].columns} for row in tables[name])
         _, kept = Store(Path("results/routes.sqlite")).table(name)
         assert len(kept) == len(tables[name])
     assert len(Store(Path("results/routes.sqlite")).rows()) == 6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import TOLERANCE
+from gradient_routes.bench.studies.tolerance.columns import TOLERANCE
 from gradient_routes.bench.studies.tolerance.measure import (
     Experiment,
     Sweep,
@@ -22,7 +23,7 @@ from gradient_routes.bench.studies.tolerance.measure import (
 from gradient_routes.bench.studies.tolerance.view import remarks
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
-from gradient_routes.routes.solvers.iterative import AT_MOST
+from gradient_routes.routes.solvers.iterative import DESCENT, solver
 
 ROUGH = "bar[n=24,sensors=24,noise=0.01]"  # at its true moduli conjugate gradients take many steps, not n
 
@@ -108,7 +109,8 @@ def test_what_cannot_run_or_fails_is_a_row_with_its_reason(monkeypatch) -> None:
     assert [row["status"] for row in singular.rows] == ["ok", "ok", "failed", "failed"]
     (line,) = remarks(singular.rows)
     assert line.plain.startswith("failed at 0.01, 0.001: fd-central")
-    monkeypatch.setitem(AT_MOST, "descent", 200)
+    shorter = solver("descent", replace(DESCENT, at_most=200), gradual=True)
+    monkeypatch.setattr("gradient_routes.routes.solvers.factorization.linear_solver", lambda name: shorter)
     unmet = study("bar", "adjoint", sweep=Sweep((1e-1, 1e-12)), linear_solver="descent").rows
     assert [row["status"] for row in unmet] == ["ok", "failed"]
     assert unmet[1]["reason"].startswith("bar: steepest descent: |b - A x| = ")

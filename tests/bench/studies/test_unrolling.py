@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.registry import study_tables
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.columns import STUDIES
 from gradient_routes.bench.studies.unrolling.measure import ROUNDING, Unrolling, unrolling
 
 TABLES = ("unrolling", "unrolling_fits")
@@ -72,7 +72,7 @@ def test_the_command_prints_rows_and_keeps_them(cli) -> None:
     ran = cli("unrolling", "--problem", "bar[n=2]", "--json")
     assert (ran.code, ran.err) == (0, "")
     for row in ran.rows:
-        assert row.keys() - {"table"} == {c.name for c in STUDIES[row["table"]]}
+        assert row.keys() - {"table"} == {c.name for c in study_tables()[row["table"]].columns}
     assert {row["table"] for row in ran.rows} == set(TABLES)
     for name in TABLES:
         _, kept = Store(Path("results/routes.sqlite")).table(name)

@@ -1,0 +1,21 @@
+"""The order in which stored cases are shown: a store holds them in the order in which they ended."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.column import Row
+
+Item = TypeVar("Item")
+
+
+def in_order(items: Iterable[Item], row: Callable[[Item], Row]) -> list[Item]:
+    """Problems as they first appear, the routes on each as `routes list` has them."""
+    items = list(items)
+    problems = [json.dumps([row(item)[name] for name in ("problem", "problem_options", "partial")]) for item in items]
+    first = {problem: i for i, problem in reversed([*enumerate(problems)])}
+    pairs = zip(problems, items, strict=True)
+    return [item for _, item in sorted(pairs, key=lambda pair: (first[pair[0]], registry.place(row(pair[1])["route"])))]

@@ -1,0 +1,38 @@
+"""Shell completion of --problem and --route: the registered names, read without importing what they name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+
+class Selector(click.types.StringParamType):
+    """Text that names problems or routes, completed by registered names, else by files."""
+
+    def __init__(self, group: str) -> None:
+        self.group = group
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+
+        from importlib.metadata import entry_points
+
+        from click.shell_completion import CompletionItem
+
+        names = {point.name for point in entry_points(group=self.group)} | ({"all"} if param.multiple else set())
+        matching = [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
+        return matching or [CompletionItem(incomplete, type="file")]
+
+
+SELECTORS = {f"--{kind}": Selector(f"gradient_routes.{kind}s") for kind in ("problem", "route")}
+
+
+def with_completion(command: click.Command) -> click.Command:
+    """The command, its --problem and --route completed."""
+    for parameter in command.params:
+        for option in parameter.opts:
+            parameter.type = SELECTORS.get(option, parameter.type)
+    return command

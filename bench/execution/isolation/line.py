@@ -1,0 +1,140 @@
+"""A confined process that does a job, seen from the process that started it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing import Pipe
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.execution.isolation.channel import SAID, Job
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.messages import Ended, Message, Order
+from gradient_routes.bench.execution.isolation.process import STACK, Confined, Killed
+from gradient_routes.bench.execution.isolation.signals import EXPIRED, STOPS, blocked
+
+WORKER = "gradient_routes.bench.execution.isolation.worker"
+
+
+class Line:
+    """A worker doing a job, and the messages it sends. A thread reads them: half a message must stop nobody.
+
+    echo        what it writes to stderr appears on this process' stderr as well
+    last_words  seconds it has at its limit of time to say what it has; None: it writes its stack to stderr, and what it
+                says from then on does not count
+    """
+
+    def __init__(
+        self, job: Job, limits: Limits, *, cwd: str | None = None, echo: bool = False, last_words: float | None = None
+    ) -> None:
+        self._left, self._all_counts = limits.timeout, last_words is not None
+        self.connection, other = Pipe()
+        with other, blocked(STOPS):
+            self.process = Confined(
+                WORKER,
+                [str(other.fileno())],
+                limits,
+                talkative=echo,
+                last_words=STACK if last_words is None else (EXPIRED, last_words) if last_words else None,
+                pass_fds=[other.fileno()],
+                cwd=cwd,
+                stdin=subprocess.DEVNULL,
+            )
+        with suppress(OSError):  # it is gone: hearing will tell
+            self.connection.send((limits, os.getpid(), sys.path))
+            self.connection.send(job)
+        self._heard: SimpleQueue[Any] = SimpleQueue()
+        self._message: Any = None
+        self._ended: Ended | None = None
+        self._listening = threading.Thread(target=self._listen, daemon=True)
+        self._listening.start()
+
+    def hear(self, look: Callable[[], None] = lambda: None) -> Message:
+        """Its next message, Ended when there are no more. What `look`, called now and then, raises is raised."""
+        if self._ended is None:
+            start = time.monotonic()
+            try:
+                self.process.watch(lambda seconds: self._came(seconds, look), start + self._left)
+            except Killed as limit:
+                self._ended = Ended(limit.status, limit.reason, killed=True)
+            finally:
+                self._left -= time.monotonic() - start
+        if self._ended is None:
+            if isinstance(self._message, Ended):
+                self._ended = self._message
+            elif self._message is None:
+                self._ended = self.process.ending()
+            else:
+                return self._message
+        self.close()  # now all it has said has come, and all of its stderr
+        return self._rest()
+
+    def say(self, order: Order) -> None:
+        """A dead worker is found out when it is heard."""
+        with suppress(OSError):
+            self.connection.send(order)
+
+    def interrupt(self, seconds: float) -> None:
+        """It has so many seconds to say what it has, which is still to be heard; Ctrl-C ends them."""
+        self._ended, self._all_counts = Ended(Status.INTERRUPTED, killed=True), True
+        with suppress(OSError):
+            self.process.process.send_signal(signal.SIGINT)
+        with suppress(KeyboardInterrupt):
+            self.process.ended(seconds)
+
+    def close(self) -> None:
+        """Whatever it and its children are at, it ends; who listens does before the line's descriptor is given away,
+        or it would read on from the next that gets it.
+        """
+        self.process.kill()
+        self._hang_up()
+        self._listening.join()
+        self.connection.close()
+
+    def _rest(self) -> Message:
+        """What it said that was not heard yet, where it counts, then the end."""
+        assert self._ended is not None
+        while self._all_counts and not self._heard.empty():
+            message = self._heard.get()
+            if isinstance(message, Ended):
+                self._ended = replace(self._ended, killed=False)  # at its limit, or interrupted, it has ended by itself
+            elif message is not None:
+                return message
+        return replace(self._ended, stderr=self.process.stderr)
+
+    def _listen(self) -> None:
+        """None for what is no message: its end, half a message, or one that cannot be read here."""
+        message: Message = ()
+        while message is not None:
+            try:
+                said, message = self.connection.recv()
+                assert said == SAID
+            except Exception:
+                message = None
+            self._heard.put(message)
+
+    def _came(self, seconds: float, look: Callable[[], None]) -> bool:
+        """Whether a message has, within so many seconds."""
+        look()
+        if self.process.gone:
+            self._hang_up()  # a child it has left behind may hold the line open: who listens gets what is on it yet
+        try:
+            self._message = self._heard.get(timeout=seconds)
+        except Empty:
+            return False
+        return True
+
+    def _hang_up(self) -> None:
+        """Nothing more will come, whoever holds the other end."""
+        with suppress(OSError), socket.fromfd(self.connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as line:
+            line.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,77 @@
+"""The process of a job: it submits to limits, does the job, says how that ended, and exits.
+
+python -P -m gradient_routes.bench.execution.isolation.worker DESCRIPTOR
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from multiprocessing.connection import Connection
+from types import FrameType
+from typing import Any
+
+from gradient_routes.bench.execution.isolation.channel import SAID, Channel, ended
+from gradient_routes.bench.execution.isolation.inside import submit_to
+from gradient_routes.bench.execution.isolation.signals import STOPS
+from gradient_routes.bench.execution.isolation.stack import told
+
+
+class Stop:
+    """KeyboardInterrupt in the job at the first signal to end, and at no later one: a process group may be told as a
+    whole and by its parent, too. A message is sent whole first.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._told = self._sending = self._waiting = False
+        for number in STOPS:
+            signal.signal(number, self._handle)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)  # blocked by who started this: none came too early
+
+    def send(self, message: Any) -> None:
+        self._sending = True
+        try:
+            self._connection.send((SAID, message))
+        finally:
+            self._sending = False
+        if self._waiting:
+            self._waiting = False
+            raise KeyboardInterrupt
+
+    def send_last(self, message: Any) -> None:
+        """Nothing interrupts any more."""
+        self._told = True
+        self._connection.send((SAID, message))
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self._told:
+            return
+        self._told = True
+        if not self._sending:
+            raise KeyboardInterrupt
+        self._waiting = True
+
+
+def main(descriptor: int) -> None:
+    """Everything of it."""
+    os.set_inheritable(descriptor, False)  # what a job starts must not hold the line open
+    told()
+    os.dup2(2, 1)  # what other people's code prints is no message, and no result
+    assert isinstance(sys.stderr, io.TextIOWrapper)
+    sys.stderr.reconfigure(write_through=True, errors="backslashreplace")  # what is printed before a crash is not lost
+    sys.stdout = sys.stderr
+    connection = Connection(descriptor)
+    limits, parent, sys.path[:] = connection.recv()
+    submit_to(limits, parent)
+    stop = Stop(connection)
+    job = connection.recv()
+    stop.send_last(ended(job, Channel(stop.send, connection.recv)))
+    sys.stderr.flush()
+    os._exit(0)  # nothing that a plug-in or XLA does at exit is of interest
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,61 @@
+"""Columns of inversions: iterations, estimates, L-curves, bias and variance."""
+
+from __future__ import annotations
+
+from gradient_routes.bench.cases.column import PLACE, PROBLEM, Column
+
+RUN = (
+    *PROBLEM,
+    Column("route", "TEXT", "", "name of the route that gives gradients"),
+    Column("route_options", "TEXT", "", "its options", json=True),
+    Column("optimizer", "TEXT", "", "lbfgs, gauss-newton, levenberg-marquardt, trust, descent, adam or one-shot"),
+    Column("alpha", "REAL", "1", "weight of Phi in J"),
+    Column("label", "TEXT", "", "selector of problem and route, as a person reads them"),
+)
+
+INVERSION = (
+    *RUN,
+    Column("iteration", "INTEGER", "1", "accepted steps so far; 0: the start"),
+    Column("objective", "REAL", "problem's", "J"),
+    Column("misfit", "REAL", "problem's", "1/2 |S u - d|^2"),
+    Column("regularization", "REAL", "problem's", "alpha Phi"),
+    Column("gradient_norm", "REAL", "problem's", "|dJ/dp|_2"),
+    Column("step_length", "REAL", "1", "|x_k - x_(k-1)|_2, x being p in natural changes"),
+    Column("forward_solves", "INTEGER", "1", "so far"),
+    Column("adjoint_solves", "INTEGER", "1", "linearized and transposed solves so far, Newton steps left out"),
+    Column("seconds", "REAL", "s", "so far"),
+    Column("distance", "REAL", "1", "|p - p_true| / |p_0 - p_true|, where the truth is known"),
+    Column("says", "TEXT", "", "what happened there: a stall, a step out of the domain, why it stopped"),
+)
+
+ESTIMATES = (
+    *RUN,
+    Column("parameter", "TEXT", "", "its name"),
+    *PLACE,
+    Column("start", "REAL", "its own", "p_0"),
+    Column("estimate", "REAL", "its own", "p at the end"),
+    Column("truth", "REAL", "its own", "p behind synthetic data"),
+    Column("gradient", "REAL", "problem's", "dJ/dp at the end"),
+    Column("blind", "INTEGER", "1", "1 where no datum depends on it"),
+)
+
+LCURVE = (
+    *RUN,
+    Column("misfit", "REAL", "problem's", "1/2 |S u - d|^2 at the minimum of J"),
+    Column("phi", "REAL", "1", "Phi there"),
+    Column("curvature", "REAL", "1", "of log Phi over log misfit"),
+    Column("discrepancy", "REAL", "1", "|S u - d| / (sigma sqrt(m)): 1 where the data are met to their noise"),
+    Column("distance", "REAL", "1", "|p - p_true| / |p_0 - p_true|"),
+    Column("iterations", "INTEGER", "1", "of the optimizer"),
+    Column("forward_solves", "INTEGER", "1", "they took"),
+    Column("chosen", "TEXT", "", "corner, discrepancy, or both"),
+    Column("ended", "TEXT", "", "why the optimizer stopped there"),
+)
+
+TRADEOFF = (
+    *RUN,
+    Column("draws", "INTEGER", "1", "noises drawn"),
+    Column("bias", "REAL", "1", "|mean p - p_true|^2 / n_p, over the draws"),
+    Column("variance", "REAL", "1", "mean |p - mean p|^2 / n_p"),
+    Column("total", "REAL", "1", "their sum: mean |p - p_true|^2 / n_p"),
+)

@@ -1,0 +1,176 @@
+"""The results of `routes run` in a terminal: the table, remarks below it, gradients parameter by parameter."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.expected import Expectation, judged
+from gradient_routes.bench.cases.outcome import View
+from gradient_routes.bench.cases.row import ANSWERED
+from gradient_routes.bench.execution.cost_model import LEGEND as WORK
+from gradient_routes.bench.execution.cost_model import summary
+from gradient_routes.bench.execution.isolation.stack import without
+from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
+from gradient_routes.bench.render.terminal import tables
+from gradient_routes.bench.render.terminal.palette import route_style
+from gradient_routes.bench.render.terminal.tables import MANY, RESOLUTION, named, titled
+from gradient_routes.bench.render.terminal.text_table import TextTable
+from gradient_routes.routes.tally import Work
+
+HEADINGS = ("problem\n  route", "J", "error", "time", "cost /\nforward\nsolve", "work", "memory", "tape")
+NUMBERS = frozenset((1, 2, 3, 4, 6, 7))
+LEGEND = f"""\
+n_u unknowns, n_p parameters; error: |g - g_ref| / |g_ref|
+time: one gradient{{}}; cost / forward solve: that time over a forward solve's
+work: {WORK}
+memory: peak of one call; tape: stored by AD for its backward sweep"""
+UNSTABLE = ", ~: unstable"
+OUTPUT_TELLS = ("crashed", "timeout", "out-of-memory")  # statuses of no exception: the end of stderr may say why
+
+
+def show(
+    rows: Sequence[Row],
+    views: Iterable[tuple[Row, View]] = (),
+    kept: Path | None = None,
+    known: Sequence[Expectation] = (),
+) -> None:
+    """Print the table, remarks, expected failures and gradients."""
+    if not rows:
+        return
+    out = tables.console()
+    tables.show(out, results(rows))
+    for line in remarks(rows):
+        out.print(line, soft_wrap=not out.is_terminal)
+    for row in rows:
+        verdict = judged(row, known)
+        if verdict is not None:
+            out.print(f"{titled(row)}: {row['route']}: {verdict.says}", style="yellow", soft_wrap=True)
+    if kept is not None:
+        out.print(f"kept in {kept}", style="dim", soft_wrap=True)
+    for row, view in views:
+        out.print()
+        tables.show(out, gradient(row, view))
+
+
+def results(rows: Sequence[Row]) -> TextTable:
+    """One row a case under the title of its problem."""
+    table = TextTable(HEADINGS, NUMBERS)
+    before = None
+    for row in rows:
+        problem = titled(row)
+        if problem != before:
+            table.title(_title(problem, [other for other in rows if titled(other) == problem]))
+            before = problem
+        style = "" if row["status"] == "ok" else "dim" if row["status"] in ANSWERED else "bold red"
+        label = Text(named("route", row), style=style or route_style(row["route"]))
+        table.row(label, [Text(cell, style=style) for cell in _cells(row)])
+    return table
+
+
+def _title(problem: str, rows: Sequence[Row]) -> str:
+    """The problem, its size, and what most errors are measured against."""
+    sizes = {"n_u": "n_state", "n_p": "n_param"}
+    known = {
+        name: next((row[column] for row in rows if row[column] is not None), None) for name, column in sizes.items()
+    }
+    said = [f"{name} = {size}" for name, size in known.items() if size is not None]
+    reference = _usual_reference(rows)
+    said += [] if reference is None else [f"error against {reference}"]
+    return f"{problem}: {', '.join(said)}" if said else problem
+
+
+def _usual_reference(rows: Sequence[Row]) -> str | None:
+    counts = Counter(row["reference"] for row in rows if row["reference"])
+    return counts.most_common(1)[0][0] if counts else None
+
+
+def _cells(row: Row) -> list[str]:
+    if row["status"] != "ok":
+        return ["", row["status"], "", "", _work(row["predicted_work"]), "", ""]
+    per_iteration = row["tape_bytes_per_iteration"]
+    return [
+        number(row["objective"], 4),
+        number(row["gradient_error"], 2) or "unknown",
+        ("~" if row["unstable"] else "") + seconds(row["seconds"]),
+        ratio(row["forward_ratio"]),
+        _work(row["work"]),
+        bytes_(row["peak_bytes"], RESOLUTION),
+        bytes_(row["tape_bytes"]) + ("" if per_iteration is None else f" ({bytes_(per_iteration)}/it)"),
+    ]
+
+
+def _work(work: dict[str, int] | None) -> str:
+    return "" if work is None else summary(Work(**work))
+
+
+def remarks(rows: Sequence[Row]) -> list[Text]:
+    """The legend, other references, reasons of skipped and failed cases, then notes, each once."""
+    legend = LEGEND.format(UNSTABLE if any(row["unstable"] for row in rows) else "")
+    below = dict.fromkeys([*_references(rows), *_reasons(rows), *_notes(rows)])
+    return [Text(legend, style="dim"), *(Text(line, style=style) for line, style in below)]
+
+
+def _references(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
+    """Errors measured against another reference than the title says."""
+    for problem in dict.fromkeys(map(titled, rows)):
+        group = [row for row in rows if titled(row) == problem]
+        usual = _usual_reference(group)
+        for row in group:
+            if row["reference"] not in (usual, None):
+                yield f"{problem}: {named('route', row)}: error against {row['reference']}", "dim"
+
+
+def _reasons(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
+    several = len({named("problem", row) for row in rows}) > 1
+    for row in rows:
+        if row["status"] != "ok":
+            where = f"{named('problem', row)}: " if several else ""
+            route = "" if row["reason"].startswith(row["route"]) else f"{row['route']}: "
+            line = f"{row['status']}: {where}{route}{row['reason']}"
+            yield line, "dim" if row["status"] in ANSWERED else "red"
+            said = without(row["stderr"] or "").splitlines()[-3:]
+            if row["status"] in OUTPUT_TELLS and said:
+                yield "\n".join(f"  | {each}" for each in said), "dim"
+
+
+def _notes(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
+    for row in rows:
+        for note in filter(None, (row["note"] or "").split("; ")):
+            yield f"note: {named('problem', row)}: {note}", "italic"
+
+
+def gradient(row: Row, view: View) -> Table:
+    """Parameter by parameter: the route's gradient beside the reference and what the problem adds."""
+    title = f"{titled(row)} by {named('route', row)}"
+    table = Table(box=None, pad_edge=False, title=Text(title), title_justify="left", title_style="bold")
+    reference = view.reference
+    table.add_column("p", no_wrap=True)
+    table.add_column("dJ/dp", justify="right", style=route_style(row["route"]))
+    if reference is not None:
+        table.add_column(Text(reference.name), justify="right")
+    for name in view.columns.columns:
+        table.add_column(Text(name), justify="right", overflow="fold")
+    blind = view.columns.blind
+    if blind is not None:
+        table.add_column("")
+    n = len(view.labels)
+    shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
+    for i in shown:
+        if i is None:
+            table.add_row(f"... {n - MANY} more", style="dim")
+            continue
+        values: list[Any] = [view.gradient[i]]
+        values += [] if reference is None else [reference.gradient[i]]
+        values += [column[i] for column in view.columns.columns.values()]
+        mark = [] if blind is None else [view.columns.mark if blind[i] else ""]
+        hidden = blind is not None and blind[i]
+        label = Text(f"{view.labels[i]} [{view.units[i]}]")
+        table.add_row(label, *(f"{v:.6g}" for v in values), *mark, style="dim" if hidden else None)
+    return table

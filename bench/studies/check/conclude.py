@@ -1,0 +1,40 @@
+"""What checks and V-curves share: the page, the rows and the exit code of a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.study import Found, Kept, Note, Say
+from gradient_routes.bench.store.output_files import check_writable
+from gradient_routes.bench.verification.page import page
+from gradient_routes.bench.verification.result import Check, rows
+
+LOST = 2  # exit code where the page asked for could not be written
+
+
+def page_writable(html: Path | None, taken: Iterable[Path | str | None]) -> None:
+    """Raise InputError now rather than after all is measured, and for a page that would replace what is read."""
+    if html is not None:
+        files = [Path(str(name).partition(":")[0].partition("[")[0]) for name in taken if name is not None]
+        check_writable("--html", html, files)
+
+
+def conclude(say: Say, check: Check, what: Row, html: Path | None) -> int:
+    """Write the page, say the verdict and its rows; the exit code."""
+    lost = html is not None and not _write_page(say, check, html)
+    say(Found(check))
+    for table, of in rows(check, what).items():
+        for row in of:
+            say(Kept(table, row))
+    return LOST if lost else check.exit_code
+
+
+def _write_page(say: Say, check: Check, html: Path) -> bool:
+    try:
+        html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        say(Note(f"--html {html}: {error.strerror or error} - name a file you may write"))
+        return False
+    return True

@@ -1,0 +1,100 @@
+"""What `routes check` judges: anyone's code, a registered problem and route, or the contract of one of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
+from gradient_routes.bench.cases.imported import imported
+from gradient_routes.bench.cases.study import Found, Say
+from gradient_routes.bench.studies.check.conclude import conclude, page_writable
+from gradient_routes.bench.studies.options import built, one_problem, one_route
+from gradient_routes.bench.verification import foreign
+from gradient_routes.bench.verification.check import accepted, check
+from gradient_routes.bench.verification.contract import of_problem, of_route
+from gradient_routes.bench.verification.plan import Plan
+from gradient_routes.bench.verification.registered import subject
+from gradient_routes.bench.verification.subject import Subject
+from gradient_routes.problems.data.csv import read_columns
+from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.newton import Solver
+
+
+def run(
+    say: Say,
+    *,
+    target: str | None,
+    objective: str | None,
+    gradient: str | None,
+    problem: str | None,
+    route: str | None,
+    at: str,
+    budget: int,
+    accept: float,
+    solver: Solver,
+    seed: int,
+    html: Path | None,
+    kept: Path | None,
+) -> int:
+    ways = {"a target": target, "--objective": objective or gradient, "--problem or --route": problem or route}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) != 1:
+        what = f"{' and '.join(given)} given" if given else "nothing to check"
+        raise InputError(f"check: {what} - give FILE.py:NAME, or --objective and --gradient, or --problem and --route")
+    if (problem is None) != (route is None):
+        return _contract(say, problem, route, at, solver)
+    plan = Plan(budget=budget, seed=seed)
+    accepted(accept)
+    asked = _subject(target, objective, gradient, problem, route, at, solver)
+    page_writable(html, [kept, target, objective, gradient, problem, route, at])
+    with stdout_to_stderr():
+        found = check(asked, plan, accept)
+    named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
+    return conclude(say, found, named, html)
+
+
+def _contract(say: Say, problem: str | None, route: str | None, at: str, solver: Solver) -> int:
+    """A problem alone with all routes, or a route alone on the bar."""
+    made, p = built(one_problem(problem or "bar"), at)
+    with stdout_to_stderr():
+        if route is not None:
+            spec = one_route(route)
+            found = of_route(made, p, spec.route, spec.options, solver)
+        else:
+            found = of_problem(made, p, [spec.route for spec in case.routes(["all"])], solver)
+    say(Found(found))
+    return 1 if found.broken else 0
+
+
+def _subject(
+    target: str | None,
+    objective: str | None,
+    gradient: str | None,
+    problem: str | None,
+    route: str | None,
+    at: str,
+    solver: Solver,
+) -> Subject:
+    if problem is not None and route is not None:
+        spec = one_route(route)
+        made, p = built(one_problem(problem), at)
+        return subject(made, spec.route, spec.options, p, solver)
+    if at == "true":
+        raise InputError("check: --at true is for registered problems with synthetic data - give a file")
+    start = None if at == "start" else _column(at)
+    if target is not None:
+        return foreign.subject_of(imported(target), target, start)
+    if objective is None or gradient is None:
+        raise InputError("check: --objective and --gradient go together - give both")
+    if start is None:
+        raise InputError("check: two functions have no start - give the point with --at FILE.csv")
+    return foreign.subject(imported(objective), imported(gradient), start, name=gradient)
+
+
+def _column(at: str) -> object:
+
+    columns = read_columns(at, None)
+    if len(columns) != 1:
+        raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
+    return next(iter(columns.values()))

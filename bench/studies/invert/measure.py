@@ -1,0 +1,225 @@
+"""What `routes invert` runs: an inversion per route, or one route over many weights of Phi."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+from gradient_routes.bench.cases.status import FOREIGN
+from gradient_routes.bench.cases.study import Found, Kept, Note, Say
+from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
+from gradient_routes.bench.inversion.lcurve import Point, l_curve, minima
+from gradient_routes.bench.inversion.minibatch import minibatched
+from gradient_routes.bench.inversion.one_shot import OneShot, of_problem
+from gradient_routes.bench.inversion.optimizers import Limits, Name
+from gradient_routes.bench.inversion.resumed import last_estimate
+from gradient_routes.bench.inversion.tradeoff import Trade, trade_off
+from gradient_routes.bench.inversion.variables import Positive, Variables
+from gradient_routes.bench.studies.options import one_problem
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.newton import Solver
+
+One = TypeVar("One")
+Start = tuple[Array | None, int]  # p and the iterations before it
+
+
+@dataclass(frozen=True)
+class Begun:
+    """An inversion begins; `truth` tells whether the true p is known."""
+
+    title: str
+    truth: bool
+
+
+@dataclass(frozen=True)
+class Ended:
+    """An inversion has ended; `one_shot` is J of the linear least-squares answer, where there is one."""
+
+    inversion: Inversion
+    one_shot: float | None
+
+
+@dataclass(frozen=True)
+class Compared:
+    """All inversions, to be compared."""
+
+    inversions: list[Inversion]
+
+
+@dataclass(frozen=True)
+class LCurve:
+    points: list[Point]
+    best: Inversion
+
+
+@dataclass(frozen=True)
+class Trades:
+    trades: list[Trade]
+
+
+def run(
+    say: Say,
+    *,
+    selector: str,
+    routes: Sequence[str],
+    at: str,
+    optimizer: Name,
+    iterations: int,
+    tolerance: float,
+    positive: Positive,
+    alpha_sweep: tuple[float, float, int] | None,
+    draws: int | None,
+    minibatch: int | None,
+    rate: float,
+    seed: int,
+    resume: bool,
+    solver: Solver,
+    kept: Path | None,
+) -> None:
+    """An interrupt or a failure ends the run, not what it has found by then."""
+    _check(iterations, tolerance, rate, draws, alpha_sweep, minibatch, optimizer)
+    if resume and kept is None:
+        raise InputError("--resume: reads a store, with --no-store there is none - leave one of them out")
+    engine = Engine(optimizer, Limits(iterations, tolerance, rate), solver, positive)
+    asked = Run(say, one_problem(selector), case.routes(routes), engine, at)
+    if alpha_sweep is None:
+        asked.each(kept if resume else None, minibatch, seed)
+    else:
+        asked.sweep(alpha_sweep, draws)
+    if asked.failure is not None:
+        raise asked.failure
+
+
+class Run:
+    """One call; `failure` is what ended it early."""
+
+    def __init__(self, say: Say, spec: ProblemSpec, routes: Sequence[RouteSpec], engine: Engine, at: str) -> None:
+        self.say, self.spec, self.routes, self.engine, self.at = say, spec, routes, engine, at
+        self.failure: BaseException | None = None
+
+    def each(self, resumed: Path | None, minibatch: int | None, seed: int) -> None:
+        """Route by route, from where each ended in the store `resumed` if given; then the cost of each."""
+        problem = self.spec()
+        starts: list[Start] = [(None, 0)] * len(self.routes)
+        if resumed is not None:  # what is not there is refused before anything runs
+            starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
+        one_shot = self._one_shot(problem)
+        done = self._until_it_ends(self._inversions(problem, starts, minibatch, seed, one_shot))
+        self.say(Found(Compared(done)))
+        for table in ("inversion", "estimates"):
+            for found in done:
+                self._keep(table, found.tables[table])
+
+    def _inversions(
+        self, problem: Problem, starts: Sequence[Start], minibatch: int | None, seed: int, one_shot: float | None
+    ) -> Iterator[Inversion]:
+        for route, (p, offset) in zip(self.routes, starts, strict=True):
+            run = None if minibatch is None else minibatched(problem, route, self.engine, minibatch, seed)
+            Variables.of(problem.parameters, problem.parameters.start, self.engine.positive, problem.name)
+            title = f"{self.spec.selector} by {route.name}, {self.engine.optimizer}"
+            self.say(Found(Begun(title, problem.truth() is not None)))
+            found = invert(self.spec, route, self.engine, self.at, p, self._show, problem, run, offset)
+            yield found
+            self.say(Found(Ended(found, one_shot)))
+            self._warn(found)
+            if found.interrupted:
+                raise KeyboardInterrupt
+
+    def _show(self, value: object) -> None:
+        self.say(Found(value))
+
+    def _until_it_ends(self, each: Iterable[One]) -> list[One]:
+        """All of them, or those before an interrupt or a failure. Raises either where it has none."""
+        done: list[One] = []
+        try:
+            for found in each:
+                done.append(found)  # not all at once: what has come stays
+        except (KeyboardInterrupt, *FOREIGN) as failure:
+            self.failure = failure
+            if not done:
+                raise
+        return done
+
+    def sweep(self, given: tuple[float, float, int], draws: int | None) -> None:
+        """Over alpha, for one route."""
+        if len(self.routes) != 1:
+            raise InputError(f"--alpha-sweep with {len(self.routes)} routes - name one, the answers are the same")
+        alphas, (route,) = list(dict.fromkeys(float(f"{a:.6g}") for a in np.geomspace(*given))), self.routes
+        if len(alphas) < given[2]:
+            raise InputError(
+                f"--alpha-sweep {given[0]:.10g} {given[1]:.10g}: are the same to six digits - go further apart"
+            )
+        if draws is not None:
+            trades = self._until_it_ends(trade_off(self.spec, route, self.engine, alphas, draws, self.at))
+            self.say(Found(Trades(trades)))
+            self._keep("tradeoff", [trade.row for trade in trades])
+            return
+        points = l_curve(self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at))))
+        best = next((point for point in points if point.chosen), points[-1]).inversion
+        self._warn(best)
+        self.say(Found(LCurve(points, best)))
+        self._keep("lcurve", [point.row for point in points])
+        for table, rows in best.tables.items():
+            self._keep(table, rows)
+
+    def _swept(self, every: Iterable[Inversion]) -> Iterator[Inversion]:
+        for found in every:
+            yield found
+            self.say(Found(found))
+            if found.interrupted:
+                raise KeyboardInterrupt
+
+    def _one_shot(self, problem: Problem) -> float | None:
+        """J of the linear least-squares answer, where u is affine in p: what the loop has to reach."""
+        route = self.routes[0]
+        if not problem.affine or route.route.objection(problem, **route.options) is not None:
+            return None
+        prior = problem.regularization
+        if prior is not None and prior.kind == "tv" and prior.alpha:
+            self.say(Found("u is affine in p, but total variation is not quadratic: no one-shot answer"))
+            return None
+        found: OneShot = of_problem(problem, route, self.engine, self.at)
+        self.say(Found(found))
+        return found.J
+
+    def _keep(self, table: str, rows: Iterable[dict[str, object]]) -> None:
+        for row in rows:
+            self.say(Kept(table, row))
+
+    def _warn(self, found: Inversion) -> None:
+        if found.warning is not None:
+            self.say(Note(f"invert: {found.warning}"))
+
+
+def _check(
+    iterations: int,
+    tolerance: float,
+    rate: float,
+    draws: int | None,
+    alpha_sweep: tuple[float, float, int] | None,
+    minibatch: int | None,
+    optimizer: str,
+) -> None:
+    """Raises InputError."""
+    if iterations < 1 or not 0.0 <= tolerance < 1.0 or not 0.0 < rate < float("inf"):
+        raise InputError(
+            f"--iterations {iterations} --tolerance {tolerance:g} --rate {rate:g} - give at least one iteration, a"
+            " tolerance below 1 and a rate > 0"
+        )
+    if draws is not None and (draws < 2 or alpha_sweep is None):
+        raise InputError(f"--draws {draws} - give at least 2, and --alpha-sweep")
+    if alpha_sweep is not None and not (0.0 < alpha_sweep[0] < alpha_sweep[1] < float("inf") and alpha_sweep[2] >= 2):
+        raise InputError(
+            f"--alpha-sweep {alpha_sweep[0]:g} {alpha_sweep[1]:g} {alpha_sweep[2]} - give 0 < LEAST < MOST, COUNT >= 2"
+        )
+    if minibatch is not None and (optimizer != "adam" or minibatch < 1):
+        raise InputError(
+            f"--minibatch {minibatch} - give at least 1, and --optimizer adam: a line search needs all of J"
+        )

@@ -1,0 +1,71 @@
+"""Options that several studies have, and what they name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from gradient_routes.problems.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+    from gradient_routes.bench.cases.study import Say
+    from gradient_routes.problems.problem import Array, Problem
+
+PROBLEM = "NAME, 'NAME[key=value]' or FILE.py:NAME: one problem."
+BUDGET = "Skip what is predicted to take more seconds; inf forces it."
+
+problem_option = click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM)
+budget_option = click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
+
+
+def one_problem(selector: str) -> ProblemSpec:
+    """The only problem that a selector names. Raises InputError."""
+    from gradient_routes.bench.cases import case
+
+    specs = case.problems([selector])
+    if len(specs) != 1:
+        raise InputError(f"--problem {selector}: names {len(specs)} problems - name one, without | and all")
+    return specs[0]
+
+
+def one_route(selector: str) -> RouteSpec:
+    """The only route that a selector names. Raises InputError."""
+    from gradient_routes.bench.cases import case
+
+    specs = case.routes([selector])
+    if len(specs) != 1:
+        raise InputError(f"--route {selector}: names {len(specs)} routes - name one")
+    return specs[0]
+
+
+def routes_of(selectors: Sequence[str], say: Say) -> list[RouteSpec]:
+    """The routes that selectors name; what `all` leaves out is said. Raises InputError."""
+    from gradient_routes.bench.cases import case
+    from gradient_routes.bench.cases.study import Note
+
+    specs = case.routes(selectors)
+    for left_out in case.left_out([], selectors):
+        say(Note(f"left out of 'all': {left_out}"))
+    return specs
+
+
+def built(spec: ProblemSpec, at: str) -> tuple[Problem, Array]:
+    """The problem and the point p. Raises InputError for a factory that fails in its own way."""
+    from gradient_routes.bench.cases import case
+    from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
+    from gradient_routes.bench.verification.guarded import FOREIGN
+    from gradient_routes.problems.errors import RoutesError
+
+    try:
+        with stdout_to_stderr():
+            problem = spec()
+    except (RoutesError, MemoryError):
+        raise
+    except FOREIGN as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"problem '{spec.name}' cannot be built: {type(error).__name__}: {said} - mend it") from error
+    return problem, case.point(problem, at)

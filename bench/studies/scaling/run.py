@@ -1,0 +1,118 @@
+"""What `routes scaling` runs: cases of every size, each kept as soon as it is measured, then the race."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import click
+
+from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.case import ProblemSpec
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.cases.study import Found as Result
+from gradient_routes.bench.cases.study import Kept, Say
+from gradient_routes.bench.command_options import checked, debugging, refuse_given
+from gradient_routes.bench.execution.executors.isolated import called
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.signals import interruptible
+from gradient_routes.bench.execution.sweep import How
+from gradient_routes.bench.execution.sweep import run as run_cases
+from gradient_routes.bench.render.terminal.tables import titled
+from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies.options import routes_of
+from gradient_routes.bench.studies.scaling.break_even import Found, Racing, break_even
+from gradient_routes.bench.studies.scaling.climbing import Series
+from gradient_routes.bench.studies.scaling.measure import scaling
+from gradient_routes.bench.studies.scaling.sizes import Sizes, sizes
+from gradient_routes.problems.errors import InputError, RoutesError
+from gradient_routes.routes.newton import Solver
+
+
+def run(
+    say: Say,
+    *,
+    selector: str,
+    routes: Sequence[str],
+    at: str,
+    first: int | None,
+    growth: float,
+    levels: int,
+    budget: float,
+    min_time: float,
+    solver: Solver,
+    isolate: bool,
+    limits: Limits,
+    kept: Path | None,
+) -> int:
+    """Ctrl-C ends the study, not what it has measured."""
+    if not 0 <= min_time < float("inf"):
+        raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
+    asked = sizes_of(case.problems([selector]), first, growth, levels)
+    specs = routes_of(routes, say)
+    settings = Settings(at, checked(budget), min_time, solver=solver)
+    lost: list[str] = []
+    interruptible()  # SIGTERM ends it like Ctrl-C: with tables
+    if not isolate:
+        limits.pin()
+    measure = partial(run_cases, how=How(isolate, limits))
+    race = partial(apart, break_even, limits) if isolate else break_even
+    done = scaling(asked, specs, settings, keeping(kept, lost), measure, race)
+    tell(None)
+    say(Result(done))
+    for table, rows in done.tables.items():
+        for row in rows:
+            say(Kept(table, row))
+    if lost:
+        raise InputError(f"{len(lost)} of {len(done.rows)} cases were not kept: {lost[0]}")
+    if done.interrupted:
+        raise KeyboardInterrupt
+    return 0 if any(row["status"] == "ok" for row in done.rows) else 1
+
+
+def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], settings: Settings) -> Found:
+    """The race in a process of its own: what ends it is a reason why there is none."""
+    try:
+        found: Found = called(race, (sizes, every, settings), limits)
+    except RoutesError as ended:
+        return [], str(ended)
+    return found
+
+
+def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels: int) -> Sizes:
+    """What to measure on. Raises InputError."""
+    if not 1.0 < growth < float("inf") or levels < 1:
+        raise InputError(f"--growth {growth:g} --levels {levels} - give a growth > 1 and at least one level")
+    if len(specs) > 1:
+        refuse_given(("growth", "levels"), "the sizes are those of the grid")
+        if first is not None:
+            raise InputError("--from: the sizes are those of the grid - leave it out")
+    return sizes(specs, first, growth, levels)
+
+
+def tell(row: Row | None) -> None:
+    """What was measured last, on a line of the terminal that the next one covers; a bar that moves would be timed."""
+    if sys.stderr.isatty() and sys.stdout.isatty():
+        said = "" if row is None else f"{titled(row)} {row['route']}: {row['status']}"
+        click.echo(f"\r\x1b[K{said[:70]}", nl=False, err=True)
+
+
+def keeping(kept: Path | None, lost: list[str]) -> Callable[[Outcome], None]:
+    """Puts a case into the store as soon as it is known; `lost` says why one is not there."""
+    store = None if kept is None else Store(kept)
+
+    def append(outcome: Outcome) -> None:
+        try:
+            if store is not None:
+                store.append(outcome.row, outcome.samples, outcome.environment)
+        except InputError as error:  # a full disk, a lock: the row is printed all the same
+            lost.append(str(error))
+        if debugging():
+            click.echo(outcome.row["traceback"] or "", err=True, nl=False)
+        tell(outcome.row)
+
+    return append

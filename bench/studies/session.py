@@ -1,0 +1,77 @@
+"""The listening end of a study: what it says is printed at once, and its rows are kept when it is over."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.row import as_json
+from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.cases.study import Kept, Note, Study
+from gradient_routes.bench.command_options import FINISHED, complain, debugging
+from gradient_routes.bench.execution.isolation.messages import Ended, Message
+from gradient_routes.bench.sanitize import unread
+from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies.job import ExitCode, Printed
+from gradient_routes.bench.units import now
+from gradient_routes.problems.errors import InputError
+
+
+class Session:
+    """One call of a study. A store that cannot be written is refused now, before anything is measured."""
+
+    def __init__(self, study: Study, kept: Path | None, as_json: bool) -> None:
+        self.study, self.as_json, self.started = study, as_json, now()
+        self.store = None if kept is None else Store(kept)
+        self.tables: dict[str, list[Row]] = {name: [] for name in study.tables}
+        self.code, self.end = 0, Ended(Status.CRASHED)
+        if self.store is not None:
+            self.store.check_writable()
+
+    def hear(self, message: Message) -> None:
+        match message:
+            case Kept(table, row):
+                self.tables[table].append(row)
+                if self.as_json and self.study.json is None:
+                    self._print(as_json({"table": table, **row}) + "\n")
+            case Note(text):
+                complain(text)
+            case Printed(text):
+                self._print(text)
+            case ExitCode(code):
+                self.code = code
+            case Ended():
+                self.end = message
+
+    def close(self) -> int:
+        """Keep the rows, say how it ended if not well; the exit code. Raises InputError where rows are lost."""
+        end = self.end
+        if self.store is not None and any(self.tables.values()):
+            try:
+                self.store.append_study(self.tables, self.started)
+            except InputError as error:
+                raise InputError(f"not kept: {error}") from error
+            if not self.as_json:
+                self._print(click.style(f"kept in {self.store.path}", dim=True) + "\n")
+        elif self.store is not None and end.status.todo:  # ended by a limit, or lost
+            self.store.append_ended(self.study.name, end.status, end.reason, end.stderr)
+        if end.status is Status.OK:
+            return self.code
+        if debugging():
+            click.echo(end.traceback, err=True, nl=False)
+        finished = FINISHED if self.study.keeps and not end.killed else None
+        if end.status is Status.INTERRUPTED:
+            complain(f"interrupted - {finished or 'nothing is kept'}")
+        else:
+            complain(end.line(self.study.name) + (f"; {finished}" if finished and end.status is Status.TIMEOUT else ""))
+        return end.status.exit_code
+
+    def _print(self, text: str) -> None:
+        """A reader who has gone ends nothing."""
+        try:
+            click.echo(text, nl=False)
+        except BrokenPipeError:
+            unread(sys.stdout)

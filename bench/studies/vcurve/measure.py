@@ -1,0 +1,87 @@
+"""What `routes vcurve` judges: difference quotients at every step, along components and random directions."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
+from gradient_routes.bench.cases.study import Say
+from gradient_routes.bench.command_options import checked
+from gradient_routes.bench.execution.cost_model import price_of
+from gradient_routes.bench.studies.check.conclude import conclude, page_writable
+from gradient_routes.bench.studies.options import built, one_problem, one_route
+from gradient_routes.bench.units import duration
+from gradient_routes.bench.verification.check import check
+from gradient_routes.bench.verification.plan import Plan
+from gradient_routes.bench.verification.registered import subject
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.errors import InputError, NotConverged, SingularMatrix
+from gradient_routes.problems.problem import Problem
+from gradient_routes.routes.newton import Solver
+
+LONGEST = 12  # digits of a number that are read
+FEW = 3  # components, where nobody says how many
+
+
+def run(
+    say: Say,
+    *,
+    selector: str,
+    route: str,
+    at: str,
+    components: str | None,
+    directions: int,
+    steps: tuple[float, float],
+    per_decade: int,
+    budget: float,
+    solver: Solver,
+    seed: int,
+    html: Path | None,
+    kept: Path | None,
+) -> int:
+    checked(budget)
+    spec = one_route(route)
+    made, p = built(one_problem(selector), at)
+    few = _default(made) if components is None else _components(components, len(p))
+    plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
+    judged = subject(made, spec.route, spec.options, p, solver)
+    with suppress(NotConverged, SingularMatrix):  # a solve that fails is part of the verdict
+        _refuse_beyond(budget, price_of(lambda: judged.objective(p))[0], plan)
+    page_writable(html, [kept, selector, route, at])
+    with stdout_to_stderr():
+        found = check(judged, plan)
+    return conclude(say, found, {"problem": selector, "route": route, "at": at}, html)
+
+
+def _default(problem: Problem) -> int | tuple[int, ...]:
+    """Element min(3, M) of a bar whose first M nodes carry sensors: it has some behind it and some before."""
+    if isinstance(problem, Bar) and problem.last_sensor:
+        return (min(3, problem.last_sensor) - 1,)
+    return FEW
+
+
+def _components(text: str, n_p: int) -> int | tuple[int, ...]:
+    """A number of components, or their numbers from 1: 2,5..7."""
+    numbers: list[int] = []
+    for item in text.split(","):
+        first, dots, last = item.strip().partition("..")
+        if not first.isdecimal() or (dots and not last.isdecimal()):
+            raise InputError(f"--components {text}: {item!r} is no number - write 3 (how many) or 2,5..7 (which)")
+        start, stop = (int(number[:LONGEST]) for number in (first, last or first))
+        if not 1 <= start <= stop <= n_p:
+            raise InputError(f"--components {text}: there are 1 to {n_p} - choose among them")
+        numbers += range(start, stop + 1)
+    if "," not in text and ".." not in text:
+        return numbers[0]
+    return tuple(dict.fromkeys(i - 1 for i in numbers))
+
+
+def _refuse_beyond(budget: float, seconds: float, plan: Plan) -> None:
+    few = plan.components if isinstance(plan.components, int) else len(plan.components)
+    calls = 2 * len(plan.steps) * (few + plan.directions)
+    if calls * seconds > budget:
+        raise InputError(
+            f"vcurve: {calls} forward solves are predicted to take {duration(calls * seconds)} > --budget {budget:g} s"
+            " - take fewer by --per-decade, --components, --directions or --steps, or --budget inf"
+        )

@@ -1,0 +1,260 @@
+"""One protocol: a job says the same in a process of its own and in this one, however it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import psutil
+import pytest
+from commands import Shell, ended, faulty, sigint_ignored
+
+from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.cases.study import Kept, Note
+from gradient_routes.bench.execution.isolation import run
+from gradient_routes.bench.execution.isolation.channel import Call, Channel
+from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
+from gradient_routes.bench.execution.isolation.run import here, stream
+from gradient_routes.bench.execution.isolation.signals import interruptible
+from gradient_routes.problems.errors import DomainError, InputError, NotConverged, SingularMatrix
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes with limits")
+
+ERRORS: dict[str, Exception] = {
+    "refused": InputError("n = 3 is odd - choose an even n"),
+    "outside": DomainError("E_1 = -1 - choose E > 0"),
+    "diverges": NotConverged("Newton stops at 1e-3 - loosen --rtol", (1.0, 1e-3)),
+    "singular": SingularMatrix("R_u is singular - fix more"),
+    "foreign": ZeroDivisionError("division by zero"),
+    "exhausted": MemoryError("1 TB"),
+    "XLA": RuntimeError("RESOURCE_EXHAUSTED: 1 TB"),
+}
+
+
+@dataclass(frozen=True)
+class Work:
+    """Says a row, then does what it is named for."""
+
+    name: str
+
+    def __call__(self, channel: Channel) -> None:
+        print("garbage")
+        channel.say(Kept("table", {"x": 1}))
+        channel.say(Note("half of it"))
+        if self.name in ERRORS:
+            raise ERRORS[self.name]
+        if self.name == "crashes":
+            os._exit(3)
+        if self.name == "takes":
+            _ = b"x" * 10**10
+        if self.name == "grows":
+            held = []
+            while True:
+                held.append(b"x" * 10**6)
+                time.sleep(1e-4)
+        if self.name == "quits":
+            sys.exit(4)
+
+
+ENDS: dict[str, Ended] = {
+    "works": Ended(Status.OK),
+    "refused": Ended(Status.REFUSED, "n = 3 is odd - choose an even n"),
+    "outside": Ended(Status.REFUSED, "E_1 = -1 - choose E > 0"),
+    "diverges": Ended(Status.NOT_CONVERGED, "Newton stops at 1e-3 - loosen --rtol"),
+    "singular": Ended(Status.FAILED, "R_u is singular - fix more"),
+    "foreign": Ended(Status.FAILED, "foreign: ZeroDivisionError: division by zero - see --debug"),
+    "quits": Ended(Status.FAILED, "quits: SystemExit: 4 - see --debug"),
+    "exhausted": Ended(Status.OUT_OF_MEMORY, "MemoryError: 1 TB"),
+    "XLA": Ended(Status.OUT_OF_MEMORY, "RuntimeError: RESOURCE_EXHAUSTED: 1 TB"),
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_a_job_says_the_same_here_and_in_a_process_of_its_own(name: str) -> None:
+    taken: list[Message] = []
+    end = here(Work(name), taken.append)
+    confined = list(stream(Work(name), Limits(), echo=False))
+    assert taken[:-1] == confined[:-1] == [Kept("table", {"x": 1}), Note("half of it")]
+    for last in (taken[-1], confined[-1]):
+        assert isinstance(last, Ended)
+        assert (last.status, last.reason, last.killed) == (ENDS[name].status, ENDS[name].reason, False)
+        assert bool(last.traceback) == (name != "works")
+    assert end is taken[-1]
+    assert "garbage" in confined[-1].stderr
+
+
+def test_an_end_is_a_line_with_its_exit_code() -> None:
+    assert ENDS["foreign"].line("tolerance") == "foreign: ZeroDivisionError: division by zero - see --debug"
+    assert (
+        ENDS["exhausted"].line("tolerance")
+        == "tolerance: out-of-memory: MemoryError: 1 TB - raise --memory, or ask for less"
+    )
+    codes = {status: status.exit_code for status in Status}
+    assert codes == dict.fromkeys(Status, 1) | {Status.OK: 0, Status.REFUSED: 2, Status.INTERRUPTED: 130}
+
+
+def test_a_job_that_crashes_or_takes_too_much_has_said_what_it_said() -> None:
+    for name, status, says in (
+        ("crashes", Status.CRASHED, "exit code 3"),
+        ("takes", Status.OUT_OF_MEMORY, "MemoryError"),
+        ("grows", Status.OUT_OF_MEMORY, "of --memory"),
+    ):
+        *said, last = stream(Work(name), Limits(memory=300 * 10**6), echo=False)
+        assert said == [Kept("table", {"x": 1}), Note("half of it")]
+        assert isinstance(last, Ended)
+        assert last.status is status
+        assert says in last.reason or "MemoryError" in last.reason
+
+
+def test_the_value_of_a_function() -> None:
+    first, last = stream(Call(divmod, (7, 2)), Limits())
+    assert first == Returned((3, 1))
+    assert last == Ended(Status.OK)
+
+
+@dataclass(frozen=True)
+class Endless:
+    """Hands over what it has when it is told to end, unless it is deaf."""
+
+    name: str = "endless"
+    deaf: bool = False
+
+    def __call__(self, channel: Channel) -> None:
+        if self.deaf:
+            signal.pthread_sigmask(signal.SIG_BLOCK, run_stops())
+        try:
+            channel.say(Note("begins"))
+            while True:
+                time.sleep(0.01)
+        except KeyboardInterrupt:
+            channel.say(Kept("table", {"x": 10**6 * "x"}))
+            raise
+
+
+def run_stops() -> set[signal.Signals]:
+    return {signal.SIGINT, signal.SIGTERM, signal.SIGALRM}
+
+
+@pytest.mark.parametrize("deaf", [False, True])
+def test_at_its_limit_a_job_hands_over_what_it_has(deaf: bool) -> None:
+    began, *said, last = stream(Endless(deaf=deaf), Limits(timeout=2.0), last_words=0.5 if deaf else 60.0)
+    assert began == Note("begins")
+    assert said == ([] if deaf else [Kept("table", {"x": 10**6 * "x"})])
+    assert isinstance(last, Ended)
+    assert (last.status, last.reason, last.killed) == (Status.TIMEOUT, "after 2 s of --timeout", deaf)
+    *said, last = stream(Endless(), Limits(timeout=2.0))
+    assert said == [Note("begins")], "without time for it there are no last words"
+
+
+@pytest.fixture
+def signals() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("ignored", [False, True])
+@pytest.mark.parametrize("deaf", [False, True])
+def test_an_interrupted_job_hands_over_what_it_has(
+    deaf: bool, ignored: bool, signals: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where this process was started with SIGINT ignored, as shells start what runs in the background."""
+    monkeypatch.setattr(run, "GRACE", 0.5 if deaf else 60.0)
+    if ignored:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    interruptible()
+    said = []
+    for message in stream(Endless(deaf=deaf), Limits()):
+        if message == Note("begins"):
+            signal.raise_signal(signal.SIGINT)
+            said.append(Note("taken whole"))
+        else:
+            said.append(message)
+    kept = [] if deaf else [Kept("table", {"x": 10**6 * "x"})]
+    assert said[:-1] == [Note("taken whole"), *kept]
+    assert (said[-1].status, said[-1].killed) == (Status.INTERRUPTED, deaf)
+
+
+def test_a_second_interrupt_is_raised_at_once(signals: None) -> None:
+    interruptible()
+    messages = stream(Endless(deaf=True), Limits())
+    next(messages)
+    signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    messages.close()
+
+
+def test_an_interrupt_here_is_raised_in_the_job(signals: None) -> None:
+    interruptible()
+    said: list[Message] = []
+
+    def take(message: Message) -> None:
+        if message == Note("begins"):
+            signal.raise_signal(signal.SIGINT)
+        said.append(message)
+
+    end = here(Endless(), take)
+    assert said == [Note("begins"), Kept("table", {"x": 10**6 * "x"}), end]
+    assert end.status is Status.INTERRUPTED
+
+
+def test_what_taking_a_message_raises_is_no_failure_of_the_job() -> None:
+    def refuse(message: Message) -> None:
+        raise InputError("the disk is full")
+
+    with pytest.raises(InputError, match="disk is full"):
+        here(Endless(), refuse)
+    messages = stream(Endless(), Limits())
+    with pytest.raises(InputError, match="disk is full"):
+        refuse(next(messages))
+    messages.close()
+    assert not psutil.Process().children()
+
+
+def test_stdout_is_for_who_takes_the_messages(capfd: pytest.CaptureFixture[str]) -> None:
+    def show(message: Message) -> None:
+        print("result")
+        os.write(1, b"by the system\n")
+
+    here(Work("works"), show)
+    captured = capfd.readouterr()
+    assert sorted(captured.out.split("\n")) == ["", *["by the system"] * 3, *["result"] * 3]
+    assert captured.err == "garbage\n"
+    for _ in stream(Work("works"), Limits()):
+        print("result")
+    captured = capfd.readouterr()
+    assert (captured.out, captured.err) == ("result\n" * 3, "garbage\n")
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("run", "--no-timing", "--problem", faulty(does="sleep"), "--route", "fd-central"),
+        ("run", "--no-timing", "--jobs", "2", "--problem", faulty(does="sleep"), "--route", "fd-central"),
+    ],
+)
+def test_a_command_started_with_sigint_ignored_is_interrupted_all_the_same(
+    started: Shell, given: tuple[str, ...]
+) -> None:
+    with sigint_ignored():
+        process = started.start(*given)
+    started.asleep()
+    process.send_signal(signal.SIGINT)
+    ran = ended(process)
+    assert (ran.code, "routes: interrupted" in ran.err) == (130, True), ran.err
+    started.nothing_is_left()
+
+
+def test_a_closed_stream_leaves_no_process() -> None:
+    messages = stream(Endless(deaf=True), Limits())
+    next(messages)
+    assert psutil.Process().children()
+    messages.close()
+    assert not psutil.Process().children()
