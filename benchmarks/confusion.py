@@ -1,8 +1,8 @@
-"""Does every fault get the verdict it deserves, and every sound route its `agrees`? The confusion matrix, measured.
+"""The confusion matrix of `routes check`: every sound route and every fault, with the verdict expected of it.
 
     python -m benchmarks.confusion
 
-Each cell is one `routes check`: a problem at a random point, a route, and the verdict expected of it.
+Each cell is one check of a route on a problem at a random point.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ PROBLEMS = (
     "advection",
     "advection[unknown=source,alpha=0.1]",
 )
-SPREAD = 0.3  # of natural changes, how far from the start a problem is looked at
+SPREAD = 0.3  # distance from the start, in natural changes, at which a problem is tested
 
 WRONG: Verdict = "wrong-gradient"
 LOOSE: Verdict = "solver-limited"
-# a fault, what it is to be called, and the problems on which it shows; `sign` shows on all
+# a fault, its expected verdict, and the problems on which it shows; `sign` shows on all
 FAULTS: tuple[tuple[str, Verdict, tuple[str, ...]], ...] = (
     ("sign", WRONG, PROBLEMS),
     ("factor", WRONG, PROBLEMS),
@@ -54,13 +54,17 @@ FAULTS: tuple[tuple[str, Verdict, tuple[str, ...]], ...] = (
     ("loose", LOOSE, (PROBLEMS[5], PROBLEMS[6], PROBLEMS[7])),
     ("stale", LOOSE, (PROBLEMS[5], PROBLEMS[6], PROBLEMS[7])),
 )
-INVISIBLE = (("transpose", PROBLEMS[0]), ("transpose", PROBLEMS[6]), ("stale", PROBLEMS[0]))  # no fault where these are
-STALE_RTOL = 1e-6  # factors of the Newton step before are the worse, the looser the solve
+INVISIBLE = (
+    ("transpose", PROBLEMS[0]),
+    ("transpose", PROBLEMS[6]),
+    ("stale", PROBLEMS[0]),
+)  # these faults change nothing there
+STALE_RTOL = 1e-6  # old factors are the worse, the looser the solve
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One check: what, where, and what it should say."""
+    """One check and its expected verdict."""
 
     problem: str
     route: str
@@ -81,7 +85,7 @@ class Judged:
 
 @dataclass
 class Matrix:
-    """All cells that were judged."""
+    """All cells."""
 
     cells: list[Judged] = field(default_factory=list)
 
@@ -91,7 +95,7 @@ class Matrix:
 
 
 def cells(seed: int = 0) -> Iterator[Cell]:
-    """Every sound route x every problem it can run on, every fault x every problem it shows on."""
+    """Every sound route on every problem, every fault on the problems it shows on."""
     for k, problem in enumerate(PROBLEMS):
         for route in SOUND:
             yield Cell(problem, route, "agrees", seed + k)
@@ -105,13 +109,13 @@ def cells(seed: int = 0) -> Iterator[Cell]:
 
 @cache
 def built(selector: str) -> Problem:
-    """Built once: all its cells share what is compiled."""
+    """Built once, so that its cells share compiled code."""
     (spec,) = case.problems([selector])
     return spec()
 
 
 def point(problem: Problem, seed: int) -> Array:
-    """Somewhere near the start, where no symmetry hides a term."""
+    """A point near the start, where no symmetry hides a term."""
     parameters = problem.parameters
     away = SPREAD * parameters.scale * np.random.default_rng(seed).uniform(-1.0, 1.0, len(parameters))
     return parameters.check(parameters.start + away, problem.name)
@@ -130,7 +134,7 @@ def matrix(which: Iterable[Cell]) -> Matrix:
 
 
 def table(found: Matrix) -> Table:
-    """Routes and faults down, problems across; a misjudgement in red."""
+    """Routes and faults by problems; wrong verdicts in red."""
     problems = list(dict.fromkeys(judged.cell.problem for judged in found.cells))
     by = {(judged.cell.route, judged.cell.problem): judged for judged in found.cells}
     out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")

@@ -1,4 +1,4 @@
-"""What V-curves reach and what checks cost: floors, slopes, calls, wall time.
+"""Accuracy and cost of checks: floors and slopes of V-curves, calls, wall time.
 
 python -m benchmarks.verdicts
 """

@@ -16,7 +16,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from gradient_routes.bench.inversion.optimizers import Ended, Limits, Name, optimizer
+from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, optimizer
 from gradient_routes.bench.inversion.variables import Positive, Variables
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
@@ -132,7 +132,7 @@ def invert(
                 end = "converged: dJ/dp is 0 at the start"
             else:
                 end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
-        except Ended as ended:
+        except Stopped as ended:
             end = str(ended)
         except KeyboardInterrupt:
             if not history.iterates:

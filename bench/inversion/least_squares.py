@@ -9,7 +9,7 @@ import numpy as np
 from gradient_routes.bench.inversion.diagnosis import explained
 from gradient_routes.bench.inversion.history import History
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from gradient_routes.bench.inversion.optimizers import Ended, Limits, accept, minimized, spent
+from gradient_routes.bench.inversion.optimizers import Limits, Stopped, accept, minimized, spent
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.newton import State
@@ -128,7 +128,7 @@ def _by_least_squares(objective: Objective, history: History, limits: Limits, de
             objective.tried.append(residuals.evaluated(x, by_x))
             accept(objective, history, limits, x)
             if len(history.iterates) > limits.iterations:
-                raise Ended(spent(limits))
+                raise Stopped(spent(limits))
         return by_x
 
     most = TRIALS * limits.iterations  # rejected steps are not iterations

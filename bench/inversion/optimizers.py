@@ -30,21 +30,21 @@ class Limits:
     rate: float = 0.1
 
 
-class Ended(Exception):
+class Stopped(Exception):
     """A reason to stop that the optimizer itself does not know."""
 
 
 def accept(objective: Objective, history: History, limits: Limits, x: Array) -> None:
-    """Record a step. Raises Ended where it is the last one."""
+    """Record a step. Raises Stopped where it is the last one."""
     found = objective.at(x)
     history.take(found)
     objective.accept(x)
     if found.J < -UNBOUNDED * objective.J_0:
-        raise Ended(f"J falls without bound: J = {found.J:.3g} after {objective.J_0:.3g} - it is no sum of squares")
+        raise Stopped(f"J falls without bound: J = {found.J:.3g} after {objective.J_0:.3g} - it is no sum of squares")
     if found.J > DIVERGED * objective.J_0:
-        raise Ended(f"diverging: J = {found.J:.3g} is {found.J / objective.J_0:.3g} times that of the start")
+        raise Stopped(f"diverging: J = {found.J:.3g} is {found.J / objective.J_0:.3g} times that of the start")
     if norm2(found.by_x) <= limits.tolerance * objective.slope_0:
-        raise Ended(f"converged: |dJ/dp| is {limits.tolerance:g} of that at the start")
+        raise Stopped(f"converged: |dJ/dp| is {limits.tolerance:g} of that at the start")
 
 
 def minimized(objective: Objective, history: History, limits: Limits, options: Any, **method: Any) -> str:
@@ -110,9 +110,9 @@ def adam(
 
 
 def defined(found: Evaluation) -> Evaluation:
-    """Raises Ended where J is not defined: steps without a line search cannot be shortened."""
+    """Raises Stopped where J is not defined: steps without a line search cannot be shortened."""
     if found.outside is not None:
-        raise Ended(f"stopped outside: {found.outside} - use a smaller --rate")
+        raise Stopped(f"stopped outside: {found.outside} - use a smaller --rate")
     return found
 
 
@@ -121,7 +121,7 @@ def spent(limits: Limits) -> str:
 
 
 def optimizer(name: Name) -> Callable[..., str]:
-    """(objective, history, limits) -> why it stopped. May raise Ended."""
+    """(objective, history, limits) -> why it stopped. May raise Stopped."""
     from gradient_routes.bench.inversion import least_squares
 
     return {

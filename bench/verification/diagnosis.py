@@ -44,7 +44,7 @@ def diagnose(seen: Examination) -> Check:
         found = replace(found, tightened=tightened, not_done=() if ended is None else (ended,))
     if reading.says != "plateau" or verdict.solver_explains(found):
         return found
-    if seen.subject.refine is not None and (found.convicted is None or found.convicted.by_mesh):
+    if seen.subject.refine is not None and (found.proof is None or found.proof.by_mesh):
         refined = refine(seen, reading)
         if isinstance(refined, Refined):
             found = replace(found, refined=refined)

@@ -101,8 +101,8 @@ def _on_noise(check: Check, reading: Reading, single: bool) -> tuple[str, str]:
 
 
 def _on_plateau(check: Check, reading: Reading) -> Check:
-    convicted, located = check.convicted, check.located
-    proven = None if convicted is None else convicted.culprit
+    proof, located = check.proof, check.located
+    proven = None if proof is None else proof.culprit
     says = f"a plateau of {reading.off:.2g} {_relative(reading)} along {reading.name}, at every step size"
     if check.verdict == "solver-limited":
         last = check.tightened[-1]

@@ -97,7 +97,7 @@ class Check:
         return f"{self.name}: {self.verdict}: {self.says} - {self.todo}"
 
     @property
-    def convicted(self) -> Finding | None:
+    def proof(self) -> Finding | None:
         """The first finding that proves a part of the gradient wrong."""
         return next((f for f in self.findings if f.culprit is not None), None)
 

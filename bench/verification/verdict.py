@@ -32,7 +32,7 @@ def _of_plateau(c: Check) -> Verdict:
         return "solver-limited"
     if c.refined is not None and c.refined.order >= SHRINKS and not _local(c.located):
         return "inconsistent-discretization"
-    if c.convicted is not None or _local(c.located):
+    if c.proof is not None or _local(c.located):
         return "wrong-gradient"
     tested = bool(c.tightened) and (c.factors_tested or any(t.moved for t in c.tightened))
     undecided = _moves(c) if tested else bool(c.not_done) or not _gross(c)

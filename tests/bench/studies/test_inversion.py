@@ -25,6 +25,7 @@ from gradient_routes.bench.inversion.optimizers import Limits
 from gradient_routes.bench.inversion.tradeoff import trade_off
 from gradient_routes.bench.inversion.variables import Variables
 from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies.invert import STUDY
 from gradient_routes.bench.studies.invert.view import cells
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.problem import Linearization, Offers, Parameters, ParameterView, Problem
@@ -167,8 +168,8 @@ NOISE = np.random.default_rng(0)
     ],
     ids="smooth rounded noisy offset edge kink forgotten".split(),
 )
-def test_who_is_to_blame(seen, says: str) -> None:
-    """The gradient is right for the smooth J in all of these: it is blamed where J is smooth, and another's."""
+def test_the_reason_of_a_failed_line_search_is_named(seen, says: str) -> None:
+    """The gradient is that of the smooth J in all of these: it is inconsistent only where J is another smooth one."""
     spec = case.ProblemSpec("bowl", {}, lambda: Bowl(seen))
     (route,) = case.routes(["adjoint"])
     found = invert(spec, route, Engine(limits=Limits(300, 1e-9)))
@@ -238,7 +239,7 @@ def test_a_zero_gradient_at_the_start_is_the_end() -> None:
         assert np.isfinite(found.p).all()
 
 
-def test_a_minimum_reached_to_rounding_blames_nobody() -> None:
+def test_a_minimum_reached_to_rounding_is_not_called_inconsistent() -> None:
     found = inverted("bar[noise=1e-2,alpha=1e-2]", limits=Limits(300, 0.0))
     assert "rounding" in found.end
 
@@ -475,9 +476,7 @@ def test_an_interrupt_keeps_what_was_found(tmp_path: Path) -> None:
 
 
 def test_the_examples_of_the_help_run(cli) -> None:
-    from gradient_routes.bench.studies.invert.command import invert as verb
-
-    lines = [line.strip() for line in verb.help.splitlines() if line.strip().startswith("routes invert --problem")]
+    lines = [line.strip() for line in STUDY.help.splitlines() if line.strip().startswith("routes invert --problem")]
     assert len(lines) == 3
     for line in lines:
         arguments = shlex.split(re.split(r" {2,}", line)[0])[1:]

@@ -48,7 +48,7 @@ def test_a_small_kink_hides_no_gross_mistake() -> None:
     assert found.verdict == "wrong-gradient"
 
 
-def test_slowly_converging_quotients_convict_nobody() -> None:
+def test_slowly_converging_quotients_do_not_make_a_gradient_wrong() -> None:
     found = check(
         lambda p: float((p**1.1).sum()), lambda p: 1.1 * p**0.1, np.array([0.0, 1.0, 2.0]), bounds=(0.0, np.inf)
     )

@@ -73,7 +73,7 @@ class Warm:
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
-def test_a_warm_started_objective_never_convicts_a_right_gradient(tolerance: float) -> None:
+def test_a_warm_started_objective_does_not_make_a_right_gradient_wrong(tolerance: float) -> None:
     warm = Warm(tolerance)
     found = check(warm.objective, warm.gradient, ROOTS)
     assert found.verdict in ("noise-limited", "undetermined", "agrees")
@@ -88,7 +88,7 @@ def test_an_objective_that_remembers_is_told() -> None:
     assert any("does it start from the last" in remark for remark in found.remarks)
 
 
-def test_a_budget_too_small_to_tighten_convicts_nobody() -> None:
+def test_a_budget_too_small_to_tighten_is_undetermined() -> None:
     found = check(*loosely(1e-3), ROOTS, tighten=lambda factor: loosely(1e-3 * factor), budget=96)
     assert found.verdict == "undetermined"
     assert "was not tightened" in found.not_done[0]
@@ -144,12 +144,12 @@ def of_cold(p: Array) -> Array:
 
 
 @pytest.mark.parametrize("tighter", [lambda k: cold(0.002), lambda k: cold(0.002 * k**0.05)])
-def test_a_tighten_that_does_little_convicts_nobody(tighter) -> None:
+def test_a_tighten_that_does_little_does_not_make_a_gradient_wrong(tighter) -> None:
     found = check(cold(0.002), of_cold, [0.3], tighten=lambda k: (tighter(k), of_cold))
     assert found.verdict != "wrong-gradient"
 
 
-def test_a_loose_solver_does_not_acquit_a_wrong_term() -> None:
+def test_a_loose_solver_does_not_excuse_a_wrong_term() -> None:
     found = check(
         cold(0.3), lambda p: 1.1 * of_cold(p), [0.3], tighten=lambda k: (cold(0.3 * k), lambda p: 1.1 * of_cold(p))
     )

@@ -1,4 +1,4 @@
-"""Objectives that give another number each time: what can still be told, and that no noise convicts."""
+"""Objectives with noise: what can still be decided, and that noise does not make a gradient wrong."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def test_float16_has_three_digits() -> None:
         lambda p: 1e16 + sines(p),  # drowned
     ],
 )
-def test_a_rounded_objective_convicts_no_right_gradient(objective) -> None:
+def test_a_rounded_objective_does_not_make_a_right_gradient_wrong(objective) -> None:
     assert check(objective, np.cos, X).verdict in ("agrees", "noise-limited")
     assert check(objective, lambda p: -np.cos(p), X).verdict in ("wrong-gradient", "noise-limited")
 
@@ -68,7 +68,7 @@ def test_a_minimum_is_no_plateau() -> None:
 
 
 @pytest.mark.parametrize("offset", [1e6, 1e9, 1e12])
-def test_a_large_J_hides_a_sign_but_does_not_acquit_it(offset: float) -> None:
+def test_a_wrong_sign_beside_a_large_J_is_not_called_right(offset: float) -> None:
     found = check(lambda p: offset + 0.1 * sines(p), lambda p: -0.1 * np.cos(p), X)
     assert found.verdict in ("wrong-gradient", "noise-limited")
 

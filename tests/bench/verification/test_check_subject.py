@@ -51,7 +51,7 @@ def test_names_are_used() -> None:
         ({}, "no start"),
     ],
 )
-def test_what_cannot_be_asked_is_one_line(arguments: dict, says: str) -> None:
+def test_a_wrong_argument_is_one_line(arguments: dict, says: str) -> None:
     with pytest.raises(InputError) as caught:
         check(lambda p: float(p.sum()), lambda p: np.ones_like(p), **arguments)
     assert says in str(caught.value)
