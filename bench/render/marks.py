@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 from gradient_routes.bench.render.figure import Axis
 from gradient_routes.bench.render.style import FAINT, PAPER, SOFT
 from gradient_routes.bench.render.view import DRAWN, SHORT, STRIP, Spec, View, calculate, datum, layer, words
+
+DENSE = 30  # points of a line that are drawn small
 
 
 def points(view: View, size: int = 45) -> list[Spec]:
@@ -22,11 +25,15 @@ def points(view: View, size: int = 45) -> list[Spec]:
 
 def line(view: View) -> list[Spec]:
     """Interrupted where a value is unknown; wide where another lies on it."""
-    wide = ("strokeWidth",) if view.covered else ()
-    path = view.series("color", "strokeDash", *wide) | {"detail": {"field": "_line"}}
+    under = sorted({f"{panel}\n{name}" for panel, name, _ in view.covered})
+    wide = {"test": f"indexof({json.dumps(under)}, datum._panel + '\\n' + datum._series) >= 0", "value": 5}
+    path = view.series("color", "strokeDash") | {"detail": {"field": "_line"}}
+    path["strokeWidth"] = {"condition": wide, "value": 1.5}
     if view.figure.order:
         path["order"] = {"field": view.figure.order, "type": "quantitative"}
-    return [layer({"type": "line", "strokeWidth": 1.5}, view.place | path, "isValid(datum._x)"), *points(view, 22)]
+    of = view.figure.lines or view.figure.series or view.figure.panels
+    dense = len(view.figure.table.rows) > DENSE * len(set(of))
+    return [layer({"type": "line"}, view.place | path, "isValid(datum._x)"), *points(view, 8 if dense else 22)]
 
 
 def bars(view: View) -> list[Spec]:
@@ -140,12 +147,12 @@ def front(view: View) -> list[Spec]:
     """Of each problem, the points that no other beats on both axes."""
     best = {
         "window": [{"op": "min", "field": "_y", "as": "_best"}],
-        "frame": [None, -1],
+        "frame": [None, 0],
         "groupby": ["problem"],
         "sort": [{"field": "_x"}, {"field": "_y"}],
     }
     mark = {"type": "line", "strokeWidth": 0.7, "opacity": 0.4, "color": SOFT}
-    unbeaten = {"filter": "!isValid(datum._best) || datum._y < datum._best"}
+    unbeaten = {"filter": "datum._y <= datum._best"}
     return [layer(mark, view.place | {"detail": {"field": "problem"}}, DRAWN, best, unbeaten)]
 
 
@@ -158,6 +165,6 @@ def diagonal(view: View) -> list[Spec]:
 
 
 def notes(view: View) -> list[Spec]:
-    mark = {"type": "text", "align": "left", "dx": 7, "dy": -8}
+    mark = {"type": "text", "align": "left", "dx": 4, "dy": -12}
     said = {"text": {"field": view.figure.note}}
     return [layer(mark, view.place | said, f"{DRAWN} && !!{datum(view.figure.note)}")]

@@ -119,7 +119,8 @@ def crossing(races: Sequence[Row]) -> Figure | None:
     return Figure(
         "break-even",
         "The number of parameters from which a route is cheaper",
-        " ".join(dict.fromkeys(f"{row['pair']}: {row['says']}." for row in rows[:3] if row["says"])),
+        " ".join(dict.fromkeys(f"{row['pair']}: {row['says']}." for row in rows[:3] if row["says"]))
+        + " Bars: 95 % confidence. Shaded: less than one parameter, so that the first route is always the cheaper one.",
         tabulate("break_even", rows, f"{columns} fixed_s each_s other_fixed_s other_each_s predicted_says", (PAIR,)),
         "points",
         x=(Axis("break_even", "parameters n_p at equal cost", "", "log", ("break_even_low", "break_even_high")),),
@@ -127,5 +128,5 @@ def crossing(races: Sequence[Row]) -> Figure | None:
         series=each(rows, "route"),
         panels=each(rows, "problem"),
         routes=True,
-        guides=(Guide("x", 1.0, "cheaper for any number", below=True),),
+        guides=(Guide("x", 1.0, "", below=True),),
     )
