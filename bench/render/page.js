@@ -43,14 +43,25 @@
     const plot = figure.node.querySelector(".plot");
     const rows = shown(figure);
     plot.classList.toggle("night", night);
-    (await figure.drawing)?.finalize();
     if (!rows.length) return plot.replaceChildren("Nothing to draw with these filters.");
     const options = { actions: false, ast: true, renderer: "svg", logLevel: ERRORS, tooltip: { theme: night ? "dark" : "light" } };
     figure.drawing = vegaEmbed(plot, { ...fitted(figure), datasets: { rows } }, options);
     return figure.drawing;
   };
-  const drawAll = async () => {
-    for (const figure of figures) if (figure.specs && !figure.drawing) await draw(figure);
+  const drawAll = async () => { // also what nobody has scrolled to
+    for (const figure of figures) if (figure.specs) await (figure.drawing || draw(figure));
+  };
+  const watch = new IntersectionObserver((changes) => {
+    for (const { isIntersecting, target } of changes) {
+      const figure = figures[target.dataset.figure];
+      if (isIntersecting && !figure.drawing) draw(figure);
+    }
+  }, { rootMargin: "600px" });
+  const again = (figure) => { // when it is seen next, which may be now
+    figure.drawing?.then((drawn) => drawn.finalize());
+    figure.drawing = undefined;
+    watch.unobserve(figure.node);
+    watch.observe(figure.node);
   };
 
   // ---- numbers
@@ -100,14 +111,14 @@
   // ---- filters for all figures
 
   const filters = document.querySelector(".filters");
-  const filtered = async () => {
+  const filtered = () => {
     for (const kind of ["problem", "route"]) {
       off[kind] = new Set([...filters.querySelectorAll(`[name=${kind}]:not(:checked)`)].map((box) => box.value));
     }
     for (const note of document.querySelectorAll("details.note")) note.hidden = !kept(note.dataset);
     for (const figure of figures) {
       filterTable(figure);
-      if (figure.drawing) await draw(figure);
+      if (figure.specs) again(figure);
     }
   };
   filters.addEventListener("change", ({ target }) => {
@@ -118,18 +129,20 @@
   });
   filters.hidden = !filters.children.length;
 
-  // ---- begin: figure after figure, so that the first is there at once
+  // ---- begin
 
   for (const figure of figures) {
     const tools = figure.node.querySelector(".tools");
     tools.hidden = false;
-    tools.addEventListener("change", ({ target }) => { figure[target.dataset.axis] = Number(target.value); draw(figure); });
+    tools.addEventListener("change", ({ target }) => { figure[target.dataset.axis] = Number(target.value); again(figure); });
     tools.addEventListener("click", ({ target }) => {
       if (target.dataset.do === "csv") download(`${figure.id}.csv`, csv(figure));
-      if (target.dataset.do === "all") { figure.all = true; target.hidden = true; draw(figure); }
+      if (target.dataset.do === "all") { figure.all = true; target.hidden = true; again(figure); }
     });
     const numbers = figure.node.querySelector(".numbers details");
     if (numbers) numbers.addEventListener("toggle", () => table(figure)); else table(figure);
+    if (figure.specs) watch.observe(figure.node);
   }
-  window.report = { figures, shown, csv, table, filtered, drawAll, drawn: drawAll() };
+  addEventListener("beforeprint", drawAll);
+  window.report = { figures, shown, csv, table, filtered, drawAll };
 })();

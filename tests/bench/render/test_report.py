@@ -52,13 +52,13 @@ const set = async (name, value, checked) => {
   const box = [...filters.querySelectorAll(`[name=${name}]`)].find((box) => box.value === value);
   box.checked = checked;
   box.dispatchEvent(new Event("change", { bubbles: true }));
-  await report.filtered();
+  await report.drawAll();
 };
 const MARKS = ["point", "bar", "rect mark"].map((role) => `.plot [aria-roledescription="${role}"]`).join();
 const marks = () => Object.fromEntries(drawn.map((figure) => [figure.id, figure.node.querySelectorAll(MARKS).length]));
-await report.drawn;
 for (const figure of drawn) figure.all = true;
-await report.filtered();
+report.filtered();
+await report.drawAll();
 const seen = { whole: marks() };
 seen.csv = Object.fromEntries(report.figures.map((figure) => [figure.id, report.csv(figure)]));
 for (const details of document.querySelectorAll(".numbers details")) details.open = true;
@@ -80,7 +80,7 @@ for (const select of document.querySelectorAll(".tools select")) for (const opti
   select.value = option.value;
   select.dispatchEvent(new Event("change", { bubbles: true }));
   const figure = report.figures.find((figure) => figure.node === select.closest("figure"));
-  await figure.drawing;
+  await report.drawAll();
   seen.chosen.push(figure.node.querySelectorAll(".plot svg").length);
 }
 const curves = report.figures.find((figure) => figure.id === "v-curves");
