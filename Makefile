@@ -10,7 +10,7 @@ DEFAULT := --problem 'bar[n=8|100|1000|10000|100000|1000000]' --problem 'block[n
 CHECKED := adjoint faulty-adjoint
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference clean
+.PHONY: help demo test lint type gate baseline benchmark benchmark-regression benchmark-baseline reports reference vega clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -79,6 +79,9 @@ reports: $(READY) ## everything in results/ as one page, results/report.html; of
 
 reference: $(READY) ## the small reference run that is committed, and its report, anew
 	$(BIN)/python -m benchmarks.reference_run
+
+vega: $(READY) ## the library that draws in pages anew, from the vl-convert of constraints.txt
+	$(BIN)/python -c 'import gzip, vl_convert; open("bench/render/vega.js.gz", "wb").write(gzip.compress(vl_convert.javascript_bundle().encode(), 9, mtime=0))'
 
 clean: ## remove what was installed, built and cached; keep results/
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks

@@ -146,9 +146,9 @@ def _table(figure: Figure) -> str:
 
     def cell(row: tuple[Any, ...], k: int, column: Any, kind: str) -> str:
         words = _verdict(row[k] or "") if column.name == "verdict" else escape(shown(column, row[k]))
-        return f"<td{kind}>{words}</td>"
+        return f"<td{kind}>{words}"
 
-    body = "".join(f"<tr>{''.join(cell(row, *column) for column in columns)}</tr>" for row in table.rows)
+    body = "".join(f"<tr>{''.join(cell(row, *column) for column in columns)}" for row in table.rows)
     label = escape(f"Numbers of {figure.title}")
     return (
         f'<div class=scroll tabindex=0 role=region aria-label="{label}">'

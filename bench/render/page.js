@@ -144,5 +144,5 @@
     if (figure.specs) watch.observe(figure.node);
   }
   addEventListener("beforeprint", drawAll);
-  window.report = { figures, shown, csv, table, filtered, drawAll };
+  window.report = { figures, csv, table, filtered, draw, drawAll };
 })();
