@@ -11,7 +11,7 @@ CHECKED := adjoint faulty-adjoint
 TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline mutants reports reference docs clean
+.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline mutants reports reference docs vega clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -89,6 +89,9 @@ reference: $(READY) ## the small reference run that is committed, and its report
 
 docs: $(READY) ## the documentation as a site, docs/_build/index.html
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build
+
+vega: $(READY) ## the library that draws in pages anew, from the vl-convert of constraints.txt
+	$(BIN)/python -c 'import gzip, vl_convert; open("bench/render/vega.js.gz", "wb").write(gzip.compress(vl_convert.javascript_bundle().encode(), 9, mtime=0))'
 
 clean: ## remove what was installed, built and cached; keep results/
 	rm -rf .venv .venvs build dist docs/_build docs/reference *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks

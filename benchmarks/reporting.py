@@ -23,10 +23,13 @@ from gradient_routes.bench.units import duration
 CASES, STUDIES, REPEATS = 1000, 12, 3
 ALLOWED_S, ALLOWED_OPEN_S, ALLOWED_BYTES = 10.0, 2.0, 8e6
 CLOCK = """<script>
-const first = performance.now();
-report.drawAll();
-document.body.offsetHeight;
-document.documentElement.dataset.opened = `${first} ${performance.now()}`;
+(async () => {
+  await report.draw(report.figures.find((figure) => figure.specs));
+  const first = performance.now();
+  await report.drawAll();
+  document.body.offsetHeight;
+  document.documentElement.dataset.opened = `${first} ${performance.now()}`;
+})();
 </script></body>"""
 READ = re.compile(r'data-opened="([\d.]+) ([\d.]+)"')
 
@@ -70,7 +73,8 @@ def cost(cases: int = CASES, studies: int = STUDIES, repeats: int = REPEATS) -> 
 def opening(page: Path, repeats: int = REPEATS) -> tuple[float, float]:
     """Seconds until the first figure, and until all, are drawn."""
     timed = page.with_name("timed.html")
-    timed.write_text(page.read_text("utf-8").replace("</body>", CLOCK), "utf-8")
+    body, _, end = page.read_text("utf-8").rpartition("</body>")
+    timed.write_text(f"{body}{CLOCK}{end}", "utf-8")
     found = [READ.search(opened(timed).dom) for _ in range(repeats)]
     times = [(float(m[1]) / 1e3, float(m[2]) / 1e3) for m in found if m is not None]
     return median(t[0] for t in times), median(t[1] for t in times)
@@ -87,8 +91,8 @@ def main() -> None:
         out.print("not opened: no Chromium on this machine")
         return
     out.print(
-        f"opened in Chromium: first figure after {duration(found.first)}, all after {duration(found.all)}"
-        f" (<= {ALLOWED_OPEN_S:g} s)"
+        f"opened in Chromium: first figure after {duration(found.first)} (<= {ALLOWED_OPEN_S:g} s), all, which are"
+        f" drawn as they are scrolled to, after {duration(found.all)}"
     )
 
 

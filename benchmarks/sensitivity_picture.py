@@ -1,6 +1,6 @@
 """A picture: where a stiff inclusion hides in the block, and where the gradient of the misfit points.
 
-    python -m benchmarks.sensitivity_picture [FILE.png]          (needs matplotlib: pip install -e '.[pictures]')
+    python -m benchmarks.sensitivity_picture [FILE.png]          (needs vl-convert: pip install -e '.[pictures]')
 
 The data are a twin's, read on the top of a block that holds the inclusion; the gradient is taken where nothing is
 known, at E = 1. Negative dJ/dlogE asks for a stiffer cell.
@@ -14,6 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gradient_routes.bench.render.figure import Axis, Figure, Table
+from gradient_routes.bench.render.picking import real
+from gradient_routes.bench.render.vega import CONFIG, records, spec
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.adjoint import adjoint
@@ -49,25 +52,30 @@ def slice_of(n: int = 12) -> Slice:
     return Slice(np.exp(truth[order]).reshape(n, n), gradient[order].reshape(n, n))
 
 
+def figure(slice_: Slice, quantity: str, label: str) -> Figure:
+    """One of the two fields, cell by cell, over x and z."""
+    n = len(slice_.truth)
+    rows = [
+        {"x": (k + 0.5) / n, "z": (j + 0.5) / n, "side": 1 / n, quantity: getattr(slice_, quantity)[j, k]}
+        for j in range(n)
+        for k in range(n)
+    ]
+    table = Table.of([real(name, "", "") for name in ("x", "z", "side", quantity)], rows)
+    x, z = (Axis(name, name, "m") for name in "xz")
+    of = {"fold": {quantity: label}, "panels": ("at y = 1/2",) * len(rows), "sides": ("side", "side")}
+    return Figure(quantity, label, "", table, "cells", (x,), (z,), z=Axis(quantity, label), **of)
+
+
 def draw(slice_: Slice, path: Path) -> None:
-    """Both fields side by side, as PNG."""
-    import matplotlib
+    """Both fields side by side, each with its own colours, as PNG."""
+    import vl_convert
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.6), layout="constrained")
-    largest = float(np.abs(slice_.sensitivity).max())
-    panels = (
-        (slice_.truth, "true E [Pa]", {"cmap": "cividis", "vmin": 0.0}),
-        (slice_.sensitivity, "dJ/dlogE at E = 1 [m$^2$]", {"cmap": "RdBu", "vmin": -largest, "vmax": largest}),
-    )
-    for axis, (field, title, colours) in zip(axes, panels, strict=True):
-        image = axis.imshow(field, origin="lower", extent=(0, 1, 0, 1), **colours)
-        axis.set(title=title, xlabel="x [m]", ylabel="z [m]")
-        figure.colorbar(image, ax=axis, shrink=0.9)
-    figure.savefig(path, dpi=120, metadata={"Software": None})
-    plt.close(figure)
+    panels = [figure(slice_, "truth", "E [Pa]"), figure(slice_, "sensitivity", "dJ/dlogE at E = 1 [m²]")]
+    drawn = [spec(each) | {"data": {"values": records(each)}} for each in panels]
+    for each in drawn:
+        each.pop("config")
+    whole = {"hconcat": drawn, "config": CONFIG, "resolve": {"scale": {"color": "independent"}}}
+    path.write_bytes(vl_convert.vegalite_to_png(whole, scale=2))
 
 
 def main() -> None:

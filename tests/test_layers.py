@@ -12,7 +12,7 @@ import pytest
 from commands import ROOT
 
 PACKAGE = ROOT / "gradient_routes"
-HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "matplotlib"}
+HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "vl_convert"}
 FLOORS = ("problems", "routes", "bench")
 # what routes may know of floor 1: the contract, no single problem
 CONTRACT = {"problem", "errors", "matrices.tridiagonal", "matrices.sparse", "jax64"}

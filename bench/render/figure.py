@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Column
 from gradient_routes.bench.cases.row import clean
-from gradient_routes.bench.render.style import Style
+from gradient_routes.bench.render.style import Style, bare
 
 Scale = Literal["linear", "log", "category"]
-Mark = Literal["points", "line", "bars", "ranges", "cells"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,11 @@ class Table:
     def names(self) -> list[str]:
         return [column.name for column in self.columns]
 
+    @property
+    def known(self) -> list[int]:
+        """Places of the columns that have any value."""
+        return [k for k, name in enumerate(self.names) if any(value is not None for value in self.column(name))]
+
     def column(self, name: str) -> list[Any]:
         """Its values, row by row."""
         place = self.names.index(name)
@@ -41,75 +46,90 @@ class Table:
 
 @dataclass(frozen=True)
 class Axis:
-    """A column on an axis, and what is written beside it."""
+    """A column on an axis, and what is written beside it; without a column, the values of `Figure.fold`.
+
+    `ends`: columns with the ends of an interval about each value, absent where it is unbounded. `domain`: what is
+    shown at least.
+    """
 
     column: str
     label: str
     unit: str = ""
     scale: Scale = "linear"
-
-    @property
-    def titled(self) -> str:
-        return f"{self.label} [{self.unit}]" if self.unit else self.label
-
-
-@dataclass(frozen=True)
-class Series:
-    """Rows of the table under one name; x and y where it has columns of its own."""
-
-    name: str
-    style: Style
-    rows: tuple[int, ...]
-    facet: int = 0
-    x: str = ""
-    y: str = ""
+    ends: tuple[str, str] | None = None
+    domain: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class Guide:
-    """A line across the plot at a number of one axis; `column`: only where that is what the axis shows."""
+    """A labelled line across a panel, or all, at a number of one axis.
+
+    `column`: where that is what the axis shows. `below`: what is less is shaded, for it means nothing.
+    """
 
     axis: Literal["x", "y"]
     value: float
     label: str
+    panel: str = ""
     column: str = ""
+    below: bool = False
 
 
 @dataclass(frozen=True)
-class Facet:
-    """One panel of a figure: its name, a verdict, what there is to see in it. `cell`: the sides of one."""
+class Told:
+    """What is said of a panel: a verdict, a sentence."""
 
-    name: str = ""
     verdict: str = ""
     says: str = ""
-    guides: tuple[Guide, ...] = ()
-    cell: tuple[float, float] = (1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A table, and series of its rows over axes; the first of several axes is the one shown. No series: no plot.
+    """A table, and how its rows are drawn; the first of several axes is the one shown first. No mark: no plot.
 
-    `note`: column of words written beside a point. `hatched`: column, 1 where a cell says nothing. `interval`: columns
-    of the ends of ranges. `front`: the points of a problem that no other beats on both axes are joined. `diagonal`:
-    the line y = x.
+    series, panels, lines  of every row: its name in the legend, its panel, what a line joins (else: its series)
+    fold     columns drawn as series of their own, by the names of those
+    routes   series are named by routes, or begin with a route's name: they have its colour
+    looks    the styles of other series, where they are not to be of the palette
+    told     what is said of panels
+    hollow   column that is true where a point is not to be relied on, or a cell says nothing
+    note     column of words written beside a point
+    order    column along which lines run, in place of x
+    front    the points of a problem that no other beats on both axes are joined
+    diagonal the line y = x
+    z, sides what the colour of a cell shows, columns with its width and height
     """
 
     id: str
     title: str
     says: str
     table: Table
+    mark: Literal["points", "line", "bars", "cells"] | None = None
     x: tuple[Axis, ...] = ()
     y: tuple[Axis, ...] = ()
-    series: tuple[Series, ...] = ()
-    facets: tuple[Facet, ...] = (Facet(),)
-    mark: Mark = "line"
-    values: tuple[Axis, ...] = ()
+    series: tuple[str, ...] = ()
+    panels: tuple[str, ...] = ()
+    lines: tuple[int, ...] = ()
+    fold: Mapping[str, str] = field(default_factory=dict)
+    routes: bool = False
+    looks: Mapping[str, Style] = field(default_factory=dict)
+    told: Mapping[str, Told] = field(default_factory=dict)
+    guides: tuple[Guide, ...] = ()
+    hollow: str = ""
     note: str = ""
-    hatched: str = ""
-    interval: tuple[str, str] | None = None
+    order: str = ""
     front: bool = False
     diagonal: bool = False
+    z: Axis = Axis("", "")
+    sides: tuple[str, str] = ("", "")
+
+    @property
+    def names(self) -> list[str]:
+        """Of all series; routes in the order of the story, others in that of rows."""
+        ends = list(dict.fromkeys(self.series or [""]))
+        if self.routes:
+            ends.sort(key=lambda name: registry.place(bare(name)))
+        return [f"{column}{end}" for end in ends for column in (self.fold.values() or [""])]
 
 
 @dataclass(frozen=True)
@@ -118,9 +138,9 @@ class Note:
 
     title: str
     says: str
-    problem: str
-    route: str
-    words: tuple[tuple[str, str], ...]
+    problem: str = ""
+    route: str = ""
+    words: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)

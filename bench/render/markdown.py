@@ -8,6 +8,7 @@ from collections.abc import Collection, Sequence
 from gradient_routes.bench.render.cell import heading, shown
 from gradient_routes.bench.render.figure import Figure, Section, Table
 from gradient_routes.bench.render.source import Source
+from gradient_routes.bench.render.vega import overlaps
 from gradient_routes.bench.sanitize import plain
 
 ROWS = 40  # of a table; a repository wants a page, not a store
@@ -30,20 +31,20 @@ def text(source: Source, sections: Sequence[Section], folder: str = "", drawn: C
 
 
 def _figure(figure: Figure, folder: str, drawn: Collection[str]) -> str:
-    lines = [f"### {figure.title}\n", f"{escaped(figure.says)}\n" if figure.says else ""]
+    lines = [f"### {figure.title}\n", f"{escaped(figure.says + overlaps(figure))}\n" if figure.says else ""]
     if figure.id in drawn:
         lines.append(f"![{escaped(figure.title)}](<{folder}/{figure.id}.png>)\n")
-    for facet in figure.facets:
-        if facet.says:
-            verdict = f" **{facet.verdict}**" if facet.verdict else ""
-            lines.append(f"- {escaped(facet.name)}{verdict}: {escaped(facet.says)}")
+    for name, told in figure.told.items():
+        if told.says and name in figure.panels:
+            verdict = f" **{escaped(told.verdict)}**" if told.verdict else ""
+            lines.append(f"- {escaped(name)}{verdict}: {escaped(told.says)}")
     lines += ["", table(figure.table)]
     return "\n".join(lines)
 
 
 def table(numbers: Table) -> str:
     """The first rows; the rest is in the store."""
-    places = [k for k, name in enumerate(numbers.names) if any(v is not None for v in numbers.column(name))]
+    places = numbers.known
     columns = [numbers.columns[k] for k in places]
     lines = [
         f"| {' | '.join(escaped(heading(column)) for column in columns)} |",

@@ -1,185 +1,170 @@
-"""Marks of a figure on the axes of Matplotlib: points and lines, bars, ranges, cells."""
+"""What is drawn, as layers of Vega-Lite: marks, and the annotations about them. A new one is a function here."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+import json
+from collections.abc import Callable
 
-from gradient_routes.bench.render.figure import Axis, Facet, Figure, Series
-from gradient_routes.bench.render.style import Marker, Style
+from gradient_routes.bench.render.figure import Axis
+from gradient_routes.bench.render.style import FAINT, PAPER, SOFT
+from gradient_routes.bench.render.view import DRAWN, SHORT, STRIP, Spec, View, calculate, datum, layer, words
 
-SHAPES: dict[Marker, str] = {
-    "circle": "o",
-    "square": "s",
-    "diamond": "D",
-    "up": "^",
-    "down": "v",
-    "right": ">",
-    "plus": "P",
-    "cross": "X",
-}
-SOFT = "#596069"
+DENSE = 30  # points of a line that are drawn small
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes: which facet, and of cells which value."""
-
-    facet: int
-    about: Facet
-    value: Axis | None = None
-
-    @property
-    def title(self) -> str:
-        parts = (self.about.name, self.value.label if self.value else "", self.about.verdict)
-        return ": ".join(filter(None, parts))
+def points(view: View, size: int = 45) -> list[Spec]:
+    """With their numbers where they stand in rows."""
+    hollow = view.figure.hollow
+    look = view.series("color", "shape", "stroke") | {"fillOpacity": {"value": 0.8}, "tooltip": view.tooltip}
+    if hollow:
+        look["fillOpacity"]["condition"] = {"test": f"!!{datum(hollow)}", "value": 0}
+    mark = {"type": "point", "filled": True, "size": size, "strokeWidth": 1.2}
+    numbers = [count(view, dx=8, dy=-7 if view.x.ends else 0)] if view.y.scale == "category" else []
+    return [layer(mark, view.place | look, DRAWN), *numbers]
 
 
-def plain(words: str) -> str:
-    """Nothing in it is mathematics to Matplotlib."""
-    return words.replace("$", r"\$")
+def line(view: View) -> list[Spec]:
+    """Interrupted where a value is unknown; wide where another lies on it."""
+    under = sorted({f"{panel}\n{name}" for panel, name, _ in view.covered})
+    wide = {"test": f"indexof({json.dumps(under)}, datum._panel + '\\n' + datum._series) >= 0", "value": 5}
+    path = view.series("color", "strokeDash") | {"detail": {"field": "_line"}}
+    path["strokeWidth"] = {"condition": wide, "value": 1.5}
+    if view.figure.order:
+        path["order"] = {"field": view.figure.order, "type": "quantitative"}
+    of = view.figure.lines or view.figure.series or view.figure.panels
+    dense = len(view.figure.table.rows) > DENSE * len(set(of))
+    return [layer({"type": "line"}, view.place | path, "isValid(datum._x)"), *points(view, 8 if dense else 22)]
 
 
-def draw(axes: Any, figure: Figure, panel: Panel) -> None:
-    """All that one panel holds."""
-    x, y = figure.x[0], figure.y[0]
-    own = [series for series in figure.series if series.facet == panel.facet]
-    if figure.mark == "cells":
-        _cells(axes, figure, own, panel)
-    elif figure.mark in ("bars", "ranges"):
-        (_bars if figure.mark == "bars" else _ranges)(axes, figure, own)
-    else:
-        if figure.front:
-            _fronts(axes, figure)
-        for series in own:
-            _points(axes, figure, series)
-        _scaled(axes, "y", y, figure, own)
-        axes.set_ylabel(y.titled)
-    _scaled(axes, "x", x, figure, own)
-    axes.set_xlabel(x.titled)
-    for guide in panel.about.guides:
-        shown = {"x": x, "y": y}[guide.axis].column
-        if not guide.column or guide.column == shown:
-            line = axes.axvline if guide.axis == "x" else axes.axhline
-            line(guide.value, color=SOFT, linestyle="--", linewidth=0.9)
-    if figure.diagonal:
-        low, high = max(axes.get_xlim()[0], axes.get_ylim()[0]), min(axes.get_xlim()[1], axes.get_ylim()[1])
-        axes.plot([low, high], [low, high], color=SOFT, linestyle="--", linewidth=0.9)
+def bars(view: View) -> list[Spec]:
+    """Lengths from 0, with their numbers."""
+    look = view.series("color") | {"tooltip": view.tooltip}
+    return [layer({"type": "bar"}, view.place | look, DRAWN), count(view, dx=4)]
 
 
-def _values(figure: Figure, series: Series) -> list[tuple[int, Any, Any]]:
-    """Row, x and y of what is known."""
-    x = figure.table.column(series.x or figure.x[0].column)
-    y = figure.table.column(series.y or figure.y[0].column)
-    return [(i, x[i], y[i]) for i in series.rows if x[i] is not None and y[i] is not None]
+def cells(view: View) -> list[Spec]:
+    """Rectangles coloured by a value; crossed where it says nothing."""
+    place: Spec = {}
+    corners = []
+    for key, axis, side in zip("xy", (view.x, view.y), view.figure.sides, strict=True):
+        place |= {key: view.position(f"_{key}_0", axis), f"{key}2": {"field": f"_{key}_1"}}
+        corners += [calculate(f"_{key}_{k}", f"datum._{key} + {k - 0.5} * {datum(side)}") for k in (0, 1)]
+    values = view.values(view.figure.z)
+    signed = min(values, default=0) < 0 < max(values, default=0)
+    colours: Spec = {"scheme": "redblue", "domainMid": 0} if signed else {"scheme": "cividis"}
+    if view.figure.z.domain:
+        colours["domain"] = list(view.figure.z.domain)
+    legend = {"title": view.figure.z.label, "gradientLength": 200, "format": ".3~g"}
+    unknown = {"condition": {"test": "!isValid(datum._value)", "value": FAINT}}
+    colour = unknown | {"field": "_value", "type": "quantitative", "scale": colours, "legend": legend}
+    rectangle = {"type": "rect", "stroke": PAPER, "strokeWidth": 0.5}
+    layers = [layer(rectangle, place | {"color": colour, "tooltip": view.tooltip}, DRAWN, *corners)]
+    if view.figure.hollow:
+        cross = {
+            "type": "point",
+            "shape": "M-1,-1L1,1M-1,1L1,-1",
+            "size": 60,
+            "strokeWidth": 1.5,
+            "color": "white",
+            "aria": False,
+        }
+        at = {key: {"field": f"_{key}", "type": "quantitative"} for key in "xy"}
+        layers.append(layer(cross, at, f"{DRAWN} && !!{datum(view.figure.hollow)}"))
+    return layers
 
 
-def _look(style: Style, line: bool) -> dict[str, Any]:
-    dash = [float(part) / 1.8 for part in style.dash.split()]
-    return {
-        "color": style.light,
-        "marker": SHAPES[style.marker],
-        "markerfacecolor": "white" if style.hollow else style.colour,
-        "markeredgecolor": style.light,
-        "linestyle": "none" if not line else (0, tuple(dash)) if dash else "-",
+MARKS: dict[str, Callable[[View], list[Spec]]] = {"points": points, "line": line, "bars": bars, "cells": cells}
+
+# ---- annotations
+
+
+def count(view: View, dx: int, dy: int = 0) -> Spec:
+    mark = {"type": "text", "align": "left", "dx": dx, "dy": dy}
+    number = calculate("_count", SHORT.format("datum._x"))
+    return layer(mark, view.place | {"text": {"field": "_count"}}, DRAWN, number)
+
+
+def zeros(view: View) -> list[Spec]:
+    """Exact zeros have no place on a logarithmic axis: a strip of their own, below it."""
+    if not view.zeros:
+        return []
+    at = {"y": {"value": view.bottom + STRIP / 2}}
+    look = view.series("color", "shape") | {"tooltip": view.tooltip}
+    return [
+        layer({"type": "point", "filled": True, "size": 45}, {"x": view.place["x"]} | at | look, "datum._zero"),
+        {"data": {"values": [{}]}, "mark": {"type": "rule"}, "encoding": {"y": {"value": view.bottom}}},
+        words({"value": "exactly 0"}, {"x": {"value": -6}} | at, align="right"),
+    ]
+
+
+def ends(view: View) -> list[Spec]:
+    """Intervals; where one end is absent, to the edge of the panel."""
+    layers = []
+    for key, axis, low_edge, high_edge in (("x", view.x, 0, view.size[0]), ("y", view.y, view.bottom, 0)):
+        for of, to, edge in _spans(axis, low_edge, high_edge):
+            at = view.place | {
+                key: view.place[key] | {"field": of},
+                f"{key}2": {"field": to} if to else {"value": edge},
+            }
+            known = [_known(end, axis) if end in (of, to) else f"!({_known(end, axis)})" for end in axis.ends or ()]
+            layers.append(layer({"type": "rule"}, at | view.series("color"), " && ".join([DRAWN, *known])))
+    return layers
+
+
+def _spans(axis: Axis, low_edge: float, high_edge: float) -> list[tuple[str, str, float]]:
+    """From one column to another, or to an edge."""
+    if axis.ends is None:
+        return []
+    low, high = axis.ends
+    return [(low, high, 0.0), (low, "", high_edge), (high, "", low_edge)]
+
+
+def _known(column: str, axis: Axis) -> str:
+    return f"{datum(column)} > 0" if axis.scale == "log" else f"isValid({datum(column)})"
+
+
+def guides(view: View) -> list[Spec]:
+    """Lines with their labels; where what is below means nothing, it is shaded and the label stands there."""
+    layers = []
+    once = f" && datum._column == '{next(iter(view.figure.fold))}'" if view.figure.fold else ""
+    found = {(g.axis, g.below) for g in view.figure.guides if g.column in ("", getattr(view, g.axis).column)}
+    for key, below in sorted(found):
+        shown = f"(!datum._of || datum._of == '{getattr(view, key).column}')"
+        test = f"datum._axis == '{key}' && datum._below == {str(below).lower()} && {shown}{once}"
+        at: Spec = {key: view.place[key] | {"field": "_guide"}}
+        place: Spec = {"y": {"value": 8}} if key == "x" else {"x": {"value": 4}}
+        look = {"align": "right" if below and key == "x" else "left"}
+        offset = {"dx": -4 if below else 4} if key == "x" else {"dy": 8 if below else -6}
+        if below:
+            edge = {f"{key}2": {"value": 0 if key == "x" else view.bottom + STRIP * view.zeros}}
+            layers.append(layer({"type": "rect", "color": SOFT, "opacity": 0.1, "aria": False}, at | edge, test))
+        layers.append(layer({"type": "rule", "strokeDash": [4, 3]}, at, test))
+        layers.append(layer({"type": "text"} | look | offset, at | place | {"text": {"field": "_label"}}, test))
+    return layers
+
+
+def front(view: View) -> list[Spec]:
+    """Of each problem, the points that no other beats on both axes."""
+    best = {
+        "window": [{"op": "min", "field": "_y", "as": "_best"}],
+        "frame": [None, 0],
+        "groupby": ["problem"],
+        "sort": [{"field": "_x"}, {"field": "_y"}],
     }
+    mark = {"type": "line", "strokeWidth": 0.7, "opacity": 0.4, "color": SOFT}
+    unbeaten = {"filter": "datum._y <= datum._best"}
+    return [layer(mark, view.place | {"detail": {"field": "problem"}}, DRAWN, best, unbeaten)]
 
 
-def _points(axes: Any, figure: Figure, series: Series) -> None:
-    points = _values(figure, series)
-    if not points:
-        return
-    _, x, y = zip(*points, strict=True)
-    look = _look(series.style, figure.mark == "line")
-    axes.plot(x, y, markersize=2.0 if len(x) > 40 and figure.mark == "line" else 4.0, label=plain(series.name), **look)
-    if figure.note:
-        words = figure.table.column(figure.note)
-        for row, *at in points:
-            if words[row]:
-                axes.annotate(plain(words[row]), at, xytext=(5, 5), textcoords="offset points", fontsize=7)
+def diagonal(view: View) -> list[Spec]:
+    """x = y, over all that both axes show."""
+    known = [value for axis in (view.x, view.y) for value in view.values(axis) if value > 0]
+    corners = [{"_x": value, "_y": value} for value in (min(known), max(known))]
+    mark = {"type": "line", "strokeDash": [4, 3], "strokeWidth": 1, "color": SOFT}
+    return [{"data": {"values": corners}, "mark": mark, "encoding": view.place}]
 
 
-def _fronts(axes: Any, figure: Figure) -> None:
-    """Of each problem: what no other route beats on both axes."""
-    problems = figure.table.column("problem")
-    points = sorted((x, y, problems[i]) for series in figure.series for i, x, y in _values(figure, series))
-    for problem in dict.fromkeys(problems):
-        front: list[tuple[float, float]] = []
-        for x, y, whose in points:
-            if whose == problem and (not front or y < front[-1][1]):
-                front.append((x, y))
-        if len(front) > 1:
-            axes.plot(*zip(*front, strict=True), color=SOFT, linewidth=0.6, alpha=0.5)
-
-
-def _scaled(axes: Any, which: str, axis: Axis, figure: Figure, own: Sequence[Series]) -> None:
-    """Logarithmic, with a place for zeros below the least number."""
-    if axis.scale != "log":
-        return
-    place = 1 if which == "x" else 2
-    values = [abs(point[place]) for series in own for point in _values(figure, series)]
-    least = min((value for value in values if value > 0.0), default=None)
-    scale = axes.set_xscale if which == "x" else axes.set_yscale
-    if least is None:
-        return
-    if 0.0 in values:
-        scale("symlog", linthresh=least, linscale=1.0)
-    else:
-        scale("log")
-
-
-def _categories(axes: Any, figure: Figure, own: Sequence[Series]) -> dict[Any, int]:
-    column = figure.table.column(figure.y[0].column)
-    names = list(dict.fromkeys(str(column[i]) for series in own for i in series.rows))
-    axes.set_yticks(range(len(names)), [plain(name if len(name) < 32 else f"{name[:31]}…") for name in names])
-    axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.grid(visible=False, axis="y")
-    return {name: k for k, name in enumerate(names)}
-
-
-def _bars(axes: Any, figure: Figure, own: Sequence[Series]) -> None:
-    at = _categories(axes, figure, own)
-    height = 0.8 / max(1, len(own))
-    for k, series in enumerate(own):
-        points = _values(figure, series)
-        places = [at[y] + (k - (len(own) - 1) / 2) * height for _, _, y in points]
-        bars = axes.barh(places, [x for _, x, _ in points], height, color=series.style.colour, label=plain(series.name))
-        axes.bar_label(bars, fmt="%.4g", padding=2, fontsize=6)
-
-
-def _ranges(axes: Any, figure: Figure, own: Sequence[Series]) -> None:
-    at = _categories(axes, figure, own)
-    ends = [figure.table.column(name) for name in figure.interval or ()]
-    for series in own:
-        for row, x, y in _values(figure, series):
-            known = [column[row] for column in ends]
-            if None not in known:
-                axes.plot(known, [at[y]] * 2, color=series.style.light)
-            axes.plot([x], [at[y]], label=plain(series.name), **_look(series.style, line=False))
-
-
-def _cells(axes: Any, figure: Figure, own: Sequence[Series], panel: Panel) -> None:
-    """Squares coloured by a value, with the scale of all slices and values of their run; blind ones hatched."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.patches import Rectangle
-
-    assert panel.value is not None
-    table, runs = figure.table, {series.name for series in own}
-    rows = [i for series in figure.series if series.name in runs for i in series.rows]
-    every = [w for v in figure.values for i in rows if (w := table.column(v.column)[i]) is not None]
-    points = [point for series in own for point in _values(figure, series)]
-    c = table.column(panel.value.column)
-    blind = table.column(figure.hatched) if figure.hatched else [None] * len(c)
-    colours = ScalarMappable(Normalize(min(every, default=0.0), max(every, default=1.0)), "cividis")
-    width, height = panel.about.cell
-    for i, x, y in points:
-        look: Any = {"facecolor": "white" if c[i] is None else colours.to_rgba(c[i]), "edgecolor": "white"}
-        hatch = "////" if blind[i] else None
-        axes.add_patch(Rectangle((x - width / 2, y - height / 2), width, height, linewidth=0.4, hatch=hatch, **look))
-    axes.figure.colorbar(colours, ax=axes, shrink=0.8)
-    axes.autoscale_view()
-    axes.set_aspect("equal")
-    axes.grid(visible=False)
-    axes.set_ylabel(figure.y[0].titled)
+def notes(view: View) -> list[Spec]:
+    mark = {"type": "text", "align": "left", "dx": 4, "dy": -12}
+    said = {"text": {"field": view.figure.note}}
+    return [layer(mark, view.place | said, f"{DRAWN} && !!{datum(view.figure.note)}")]

@@ -10,7 +10,7 @@ from gradient_routes.bench.cases.row import ANSWERED, ENVIRONMENTS, STATUSES
 from gradient_routes.bench.execution.isolation.stack import without
 from gradient_routes.bench.render.figure import Figure, Note, Section, Table
 from gradient_routes.bench.render.format import number, ratio
-from gradient_routes.bench.render.picking import grouped, in_order, tabulate, text
+from gradient_routes.bench.render.picking import doubt, grouped, in_order, tabulate, text
 from gradient_routes.bench.render.source import Source, schema
 
 
@@ -46,8 +46,7 @@ def matrix(cases: Sequence[Row]) -> Figure:
     """Problems down, routes across: what one gradient costs and how wrong it is, or why there is none."""
     routes = in_order(row["by"] for row in cases)
     rows = []
-    for places in grouped(cases, lambda row: row["problem"]).values():
-        of = [cases[i] for i in places]
+    for of in grouped(cases, lambda row: str(row["problem"])).values():
         cells: dict[str, list[str]] = {}
         for row in of:
             cells.setdefault(row["by"], []).append(_cell(row))
@@ -58,7 +57,8 @@ def matrix(cases: Sequence[Row]) -> Figure:
     return Figure(
         "matrix",
         "Every problem by every route",
-        "Forward solves that one gradient costs, and its relative error; or what became of it.",
+        "Cost of one gradient / forward solve, and its relative error; or what became of the case. ~: the time is"
+        " noisy, or less than the forward solve that it contains.",
         Table.of(columns, rows),
     )
 
@@ -66,7 +66,7 @@ def matrix(cases: Sequence[Row]) -> Figure:
 def _cell(row: Row) -> str:
     if row["status"] != "ok":
         return str(row["status"])
-    cost = f"{ratio(row['forward_ratio'])}×" if row["forward_ratio"] is not None else "ok"
+    cost = "ok" if row["forward_ratio"] is None else f"{'~' if doubt(row) else ''}{ratio(row['forward_ratio'])}×"
     return f"{cost} · {number(row['gradient_error'], 1) or '?'}"
 
 

@@ -1,14 +1,15 @@
-"""From rows of the store to tables and series of a figure."""
+"""From rows of the store to tables and names of a figure."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.render.figure import Table
 from gradient_routes.bench.render.source import schema
+from gradient_routes.bench.render.style import bare
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -19,26 +20,17 @@ def tabulate(table: str, rows: Sequence[Row], names: str, own: Iterable[Column] 
     return Table.of([known[name] for name in names.split()], rows)
 
 
-def grouped(rows: Sequence[Row], key: Callable[[Row], Key]) -> dict[Key, tuple[int, ...]]:
-    """Places of rows by their key, in the order in which keys appear."""
-    found: dict[Key, list[int]] = {}
-    for place, row in enumerate(rows):
-        found.setdefault(key(row), []).append(place)
-    return {name: tuple(places) for name, places in found.items()}
+def each(rows: Iterable[Row], column: str) -> tuple[str, ...]:
+    """The text of a column, row by row; "" where there is none."""
+    return tuple("" if row[column] is None else str(row[column]) for row in rows)
 
 
-def by_column(rows: Sequence[Row], column: str) -> dict[Any, tuple[int, ...]]:
-    return grouped(rows, lambda row: row[column])
-
-
-def sorted_by(rows: Sequence[Row], places: Iterable[int], column: str) -> tuple[int, ...]:
-    """Places in the order of a number, so that a line runs one way; what has none is left out."""
-    return tuple(sorted((i for i in places if rows[i][column] is not None), key=lambda i: rows[i][column]))
-
-
-def bare(selector: str | None) -> str:
-    """`bar` of `bar[n=8], at true`."""
-    return (selector or "").partition("[")[0].partition(",")[0]
+def grouped(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
+    """Rows by their key, in the order in which keys appear."""
+    found: dict[Key, list[Row]] = {}
+    for row in rows:
+        found.setdefault(key(row), []).append(row)
+    return found
 
 
 def in_order(selectors: Iterable[str]) -> list[str]:
@@ -46,9 +38,12 @@ def in_order(selectors: Iterable[str]) -> list[str]:
     return sorted(dict.fromkeys(selectors), key=lambda text: registry.place(bare(text)))
 
 
-def least(rows: Iterable[Row], column: str) -> Row | None:
-    """The row with the least of a number."""
-    return min((row for row in rows if row[column] is not None), key=lambda row: row[column], default=None)
+def doubt(row: Row) -> str | None:
+    """Why the time of a case is not to be relied on."""
+    ratio, work = row["forward_ratio"], row["work"]
+    if ratio is not None and ratio < 1.0 and work is not None and work["forward_solves"] >= 1:
+        return "noise: less than the forward solve that it contains"
+    return "noisy: quartiles more than 10 % of the median apart" if row["unstable"] else None
 
 
 def text(name: str, meaning: str = "") -> Column:

@@ -1,40 +1,39 @@
-"""One colour, marker and dash for a name, the same in every figure: routes have theirs, others get them by a hash."""
+"""One colour, marker and dash for a name, the same in every figure: routes have theirs, others get them in turn."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from typing import Literal
 
 from gradient_routes.bench.render.terminal.palette import ROUTES
 
-Marker = Literal["circle", "square", "diamond", "up", "down", "cross", "plus", "right"]
-MARKERS: dict[str, Marker] = {
-    "fd-one-sided": "down",
-    "fd-central": "up",
+MARKERS = {  # as Vega names them
+    "fd-one-sided": "triangle-down",
+    "fd-central": "triangle-up",
     "complex-step": "diamond",
     "tangent": "square",
     "adjoint": "circle",
-    "unrolled-ad": "plus",
-    "implicit-ad": "right",
+    "unrolled-ad": "cross",
+    "implicit-ad": "triangle-right",
 }
 # Tol's muted palette (2021), told apart by the colour-blind; none of it is a route's
 OTHERS = ("#332288", "#882255", "#999933", "#44AA99", "#AA4499", "#117733", "#DDCC77", "#661100")
-SHAPES: tuple[Marker, ...] = ("cross", "diamond", "square", "up", "circle", "down", "right", "plus")
-DASHES = ("", "6 3", "2 3", "8 3 2 3", "12 4", "4 2 1 2")
+SHAPES = ("circle", "triangle-down", "triangle-right", "cross", "diamond", "square", "triangle-up", "triangle-left")
+DASHES = ((1, 0), (6, 3), (2, 3), (8, 3, 2, 3), (12, 4), (4, 2, 1, 2))
 PAPER, NIGHT = "#ffffff", "#14171a"
+INK, SOFT, FAINT = "#1b1f24", "#596069", "#e4e7ea"
+AT_NIGHT = {PAPER: NIGHT, INK: "#e6e9ec", SOFT: "#a0a8b1", FAINT: "#262b31"}
 CONTRAST = 3.0  # of marks on what is behind them (WCAG 2.1, 1.4.11)
 
 
 @dataclass(frozen=True)
 class Style:
-    """How a series looks: its colour as declared, on paper and at night; hollow markers and dashes tell variants."""
+    """How a series looks: its colour as declared, on paper and at night; dashes tell variants."""
 
     colour: str
-    marker: Marker = "circle"
-    dash: str = ""
-    hollow: bool = False
+    marker: str = "circle"
+    dash: tuple[int, ...] = DASHES[0]
 
     @property
     def light(self) -> str:
@@ -45,7 +44,7 @@ class Style:
         return readable(self.colour, NIGHT)
 
 
-INK = Style("#4a5058")
+GREY = Style("#4a5058")
 
 
 def of_route(name: str) -> Style:
@@ -56,29 +55,26 @@ def of_route(name: str) -> Style:
     return Style(OTHERS[digest[0] % len(OTHERS)], SHAPES[digest[1] % len(SHAPES)])
 
 
-def of_routes(selectors: Iterable[str]) -> dict[str, Style]:
+def bare(selector: str | None) -> str:
+    """`bar` of `bar[n=8], at true`."""
+    return (selector or "").partition("[")[0].partition(",")[0]
+
+
+def of_routes(names: Iterable[str]) -> dict[str, Style]:
     """Variants of one route have its colour, and dashes of their own."""
     found: dict[str, Style] = {}
     variants: dict[str, int] = {}
-    for selector in selectors:
-        if selector not in found:
-            name = selector.partition("[")[0]
-            k = variants[name] = variants.get(name, -1) + 1
-            found[selector] = variant(of_route(name), k)
+    for name in dict.fromkeys(names):
+        k = variants[bare(name)] = variants.get(bare(name), -1) + 1
+        found[name] = replace(of_route(bare(name)), dash=DASHES[k % len(DASHES)])
     return found
-
-
-def variant(style: Style, k: int) -> Style:
-    return replace(style, dash=DASHES[k % len(DASHES)], hollow=k % 2 == 1)
 
 
 def others(names: Iterable[str]) -> dict[str, Style]:
     """Of what is no route, in the order given."""
     unique = list(dict.fromkeys(names))
-    return {
-        name: Style(OTHERS[k % len(OTHERS)], SHAPES[(k + 4) % len(SHAPES)], DASHES[k // len(OTHERS) % len(DASHES)])
-        for k, name in enumerate(unique)
-    }
+    n = len(OTHERS)
+    return {name: Style(OTHERS[k % n], SHAPES[k % n], DASHES[k // n % len(DASHES)]) for k, name in enumerate(unique)}
 
 
 def readable(colour: str, background: str) -> str:

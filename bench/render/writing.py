@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from gradient_routes.bench.render import draw, html, markdown
+from gradient_routes.bench.render import html, markdown, pictures
 from gradient_routes.bench.render.figure import Section
 from gradient_routes.bench.render.sections import sections
 from gradient_routes.bench.render.source import Source, read
@@ -26,11 +26,11 @@ def report(store: Store, output: Path | None, format: str | None, folder: Path |
         assert output is not None
         _check(store, output)
     if folder is not None:
-        draw.check(folder)
+        pictures.check(folder)
     source = read(store)
     made = sections(source)
-    drawn = [] if folder is None else draw.write(made, folder)
-    said = [] if folder is None else [f"{len(drawn)} figures as {', '.join(draw.FORMATS)} in {folder}"]
+    drawn = [] if folder is None else pictures.write(made, folder)
+    said = [] if folder is None else [f"{len(drawn)} figures as {', '.join(pictures.FORMATS)} in {folder}"]
     if format is not None:
         text = _text(source, made, format, output, folder, drawn)
         _write(output or STDOUT, text)
@@ -42,7 +42,7 @@ def _text(
     source: Source, made: list[Section], format: str, output: Path | None, folder: Path | None, drawn: list[str]
 ) -> str:
     if format == "html":
-        return html.page(source, made)
+        return html.report(source, made)
     beside = Path.cwd() if output in (None, STDOUT) or output is None else output.resolve().parent
     where = "" if folder is None else Path(os.path.relpath(folder.resolve(), beside)).as_posix()
     return markdown.text(source, made, where, drawn)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.render.figure import Axis, Facet, Figure, Section, Series
+from gradient_routes.bench.render.figure import Axis, Figure, Section
 from gradient_routes.bench.render.format import number
-from gradient_routes.bench.render.picking import bare, grouped, in_order, real, sorted_by, tabulate, text
+from gradient_routes.bench.render.picking import each, grouped, real, tabulate, text
 from gradient_routes.bench.render.source import Source
-from gradient_routes.bench.render.style import Style, of_route, variant
 from gradient_routes.bench.studies.invert import estimates_figures as estimates
 from gradient_routes.bench.studies.invert import regularization_figures as regularization
 
@@ -28,12 +27,10 @@ REACHED = (
 
 def section(source: Source) -> Section | None:
     rows = [row | {"run": named(row)} for row in source.table("inversion")]
-    figures = (
-        history(rows),
-        reached(rows),
-        *estimates.figures([row | {"run": named(row), "panel": _panel(row)} for row in source.table("estimates")]),
-        *regularization.figures(source),
-    )
+    found = [
+        row | {"run": named(row), "panel": f"{row['problem']} by {named(row)}"} for row in source.table("estimates")
+    ]
+    figures = (history(rows), reached(rows), *estimates.figures(found), *regularization.figures(source))
     drawn = tuple(f for f in figures if f is not None)
     says = "From gradients to parameters: the misfit step by step, what was found, how much to regularize."
     return Section("inversion", "Inversion", says, drawn) if drawn else None
@@ -45,37 +42,16 @@ def named(row: Row) -> str:
     return f"{row['route']}, {row['optimizer']}{alpha}"
 
 
-def _panel(row: Row) -> str:
-    return f"{row['problem']} by {named(row)}"
-
-
-def styles(rows: Sequence[Row]) -> dict[str, Style]:
-    """The colour of the route, dashes for its runs."""
-    found: dict[str, Style] = {}
-    variants: dict[str, int] = {}
-    for run, route in dict.fromkeys((row["run"], row["route"]) for row in rows):
-        name = bare(route)
-        k = variants[name] = variants.get(name, -1) + 1
-        found[run] = variant(of_route(name), k)
-    return found
-
-
 def history(rows: Sequence[Row]) -> Figure | None:
     if not rows:
         return None
-    panels = grouped(rows, lambda row: row["problem"])
-    looks = styles(sorted(rows, key=lambda row: in_order([row["route"]])[0]))
-    series = [
-        Series(run, looks[run], sorted_by(rows, (places[i] for i in of), "iteration"), facet)
-        for facet, places in enumerate(panels.values())
-        for run, of in grouped([rows[i] for i in places], lambda row: row["run"]).items()
-    ]
     columns = "problem route optimizer alpha run iteration objective misfit regularization gradient_norm step_length"
     return Figure(
         "history",
         "Misfit, step by step",
-        _says(rows),
+        says(rows),
         tabulate("inversion", rows, f"{columns} forward_solves adjoint_solves seconds distance says", REACHED[:1]),
+        "line",
         x=(
             Axis("iteration", "iteration"),
             Axis("forward_solves", "forward solves"),
@@ -83,30 +59,32 @@ def history(rows: Sequence[Row]) -> Figure | None:
             Axis("seconds", "time", "s"),
         ),
         y=(
-            Axis("misfit", "misfit ½|Su − d|²", scale="log"),
-            Axis("objective", "J", scale="log"),
-            Axis("gradient_norm", "|dJ/dp|", scale="log"),
+            Axis("misfit", "misfit ½|Su − d|²", "unit of J", scale="log"),
+            Axis("objective", "J", "unit of J", scale="log"),
+            Axis("gradient_norm", "|dJ/dp|", "unit of J / p", scale="log"),
             Axis("distance", "distance to the truth, relative", scale="log"),
         ),
-        series=tuple(series),
-        facets=tuple(Facet(problem) for problem in panels),
+        series=each(rows, "run"),
+        panels=each(rows, "problem"),
+        routes=True,
     )
 
 
-def _says(rows: Sequence[Row]) -> str:
+def says(rows: Sequence[Row]) -> str:
     costs = [row for row in arrivals(rows) if row["solves"] is not None]
     if not costs:
-        return "Flat lines have stalled; steep ones know the curvature."
+        return "A flat line has stalled."
     cheap, dear = min(costs, key=lambda r: r["solves"]), max(costs, key=lambda r: r["solves"])
-    said = f"{cheap['run']} arrives after {cheap['solves']} forward solves on {cheap['problem']}"
-    return f"{said}; the dearest that arrives, {dear['run']}, after {dear['solves']}." if cheap != dear else f"{said}."
+    said = (
+        f"{cheap['run']} comes close to the least misfit after {cheap['solves']} forward solves on {cheap['problem']}"
+    )
+    return f"{said}; the most costly, {dear['run']}, after {dear['solves']}." if cheap != dear else f"{said}."
 
 
 def arrivals(rows: Sequence[Row]) -> Iterator[Row]:
     """What each run took to come close to the least misfit of its problem."""
-    for places in grouped(rows, lambda row: (row["problem"], row["alpha"])).values():
-        of = [rows[i] for i in places]
-        runs = [[of[i] for i in each] for each in grouped(of, lambda row: row["run"]).values()]
+    for of in grouped(rows, lambda row: (row["problem"], row["alpha"])).values():
+        runs = list(grouped(of, lambda row: str(row["run"])).values())
         ends = [run[-1]["misfit"] for run in runs if run[-1]["misfit"] is not None]
         for run in runs if ends else []:
             aim = CLOSE * min(ends)
@@ -131,7 +109,7 @@ def reached(rows: Sequence[Row]) -> Figure | None:
     best = min(row["final"] for row in found if row["final"] is not None)
     return Figure(
         "arrivals",
-        "What it costs to arrive",
+        "What it costs to come close to the least misfit",
         f"{there} of {len(found)} runs come within {CLOSE:g} times the least misfit on their problem;"
         f" the least of all is {number(best)}.",
         tabulate("inversion", found, "problem route run aim iterations solves adjoints time final ended", REACHED),

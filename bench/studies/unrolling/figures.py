@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.render.figure import Axis, Facet, Figure, Guide, Section, Series
+from gradient_routes.bench.render.figure import Axis, Figure, Guide, Section
 from gradient_routes.bench.render.format import bytes_
-from gradient_routes.bench.render.picking import grouped, sorted_by, tabulate
+from gradient_routes.bench.render.picking import each, tabulate
 from gradient_routes.bench.render.source import Source
-from gradient_routes.bench.render.style import of_route, variant
+from gradient_routes.bench.studies.bill.figures import ERROR, SECONDS, TAPE
 
 
 def section(source: Source) -> Section | None:
@@ -15,67 +17,56 @@ def section(source: Source) -> Section | None:
     fits = source.table("unrolling_fits")
     if not rows:
         return None
-    figures = (curves(rows, fits), *([] if not fits else [met(fits)]))
+    figures = (curves(rows, fits), *([tapes(fits)] if fits else []))
     says = "An iteration that AD differentiates step by step has to converge twice: in u, then in its derivative."
     return Section("unrolling", "Unrolled iterations", says, figures)
 
 
-def curves(rows: list[Row], fits: list[Row]) -> Figure:
-    panels = grouped(rows, lambda row: row["problem"])
-    names = list(dict.fromkeys(named(row) for row in rows))
-    styles = {name: variant(of_route("unrolled-ad"), k) for k, name in enumerate(names)}
-    series = []
-    for facet, places in enumerate(panels.values()):
-        for name, of in grouped([rows[i] for i in places], named).items():
-            line = sorted_by(rows, (places[i] for i in of), "iterations")
-            series.append(Series(name, styles[name], line, facet))
+def curves(rows: Sequence[Row], fits: Sequence[Row]) -> Figure:
+    implicit = {row["problem"]: row["implicit_error"] for row in fits if row["implicit_error"]}
     columns = "problem inner checkpoint iterations newton gradient_error objective_error tape_bytes products seconds"
     return Figure(
         "unrolling",
         "Error and tape against iterations",
-        _says(fits),
+        says(fits),
         tabulate("unrolling", rows, f"{columns} residual status reason"),
+        "line",
         x=(Axis("iterations", "k, iterations", scale="log"),),
         y=(
-            Axis("gradient_error", "|g − g_ref| / |g_ref|", scale="log"),
-            Axis("objective_error", "|J − J_ref| / |J_ref|", scale="log"),
-            Axis("tape_bytes", "tape", "byte", "log"),
+            ERROR,
+            Axis("objective_error", "error |J − J_ref| / |J_ref|", scale="log"),
+            TAPE,
             Axis("products", "products with R_u", scale="log"),
-            Axis("seconds", "one gradient", "s", "log"),
+            SECONDS,
         ),
-        series=tuple(series),
-        facets=tuple(Facet(problem, guides=_guides(problem, fits)) for problem in panels),
+        series=tuple(map(named, rows)),
+        panels=each(rows, "problem"),
+        guides=tuple(
+            Guide("y", error, "error of implicit-ad", problem, ERROR.column) for problem, error in implicit.items()
+        ),
     )
 
 
 def named(row: Row) -> str:
-    kept = "" if row["checkpoint"] is None else f", every {row['checkpoint']}th kept"
+    kept = "" if row["checkpoint"] is None else f", a checkpoint every {row['checkpoint']} iterations"
     return f"{row['inner']}{kept}"
 
 
-def _guides(problem: str, fits: list[Row]) -> tuple[Guide, ...]:
-    """Where implicit AD stands; drawn over errors alone."""
-    errors = [row["implicit_error"] for row in fits if row["problem"] == problem and row["implicit_error"]]
-    return (Guide("y", errors[0], "implicit-ad", "gradient_error"),) if errors else ()
-
-
-def _says(fits: list[Row]) -> str:
-    met = [row for row in fits if row["meets"] is not None]
-    if not met:
-        return "Errors fall with k; so does nothing else: tape and time grow with it."
-    said = [
-        f"{named(row)} meets implicit-ad at k = {row['meets']}"
-        + (f", {bytes_(row['bytes_per_iteration'])} of tape each" if row["bytes_per_iteration"] else "")
-        for row in met[:3]
+def says(fits: Sequence[Row]) -> str:
+    met = [
+        f"{named(row)} reaches the error of implicit-ad at k = {row['meets']}"
+        + (f", with {bytes_(row['bytes_per_iteration'])} of tape per iteration" if row["bytes_per_iteration"] else "")
+        for row in fits
+        if row["meets"] is not None
     ]
-    return f"{'; '.join(said)}."
+    return f"{'; '.join(met[:3])}." if met else "Errors fall with k while tape and time grow with it."
 
 
-def met(fits: list[Row]) -> Figure:
+def tapes(fits: Sequence[Row]) -> Figure:
     columns = "problem inner checkpoint meets implicit_error enough bytes_per_iteration fixed_bytes fit_residual"
     return Figure(
         "tapes",
-        "Tapes, fitted",
-        "Bytes of tape are a line in k; checkpoints trade them for products.",
+        "Tape per iteration",
+        "Bytes of tape fitted as a line in k; checkpoints save tape and cost further products.",
         tabulate("unrolling_fits", fits, f"{columns} compared_at tape_ratio products_ratio time_ratio"),
     )

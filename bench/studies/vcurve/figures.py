@@ -6,24 +6,24 @@ from collections import Counter
 from collections.abc import Sequence
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.render.figure import Axis, Facet, Figure, Section, Series
+from gradient_routes.bench.render.figure import Figure, Section, Told
 from gradient_routes.bench.render.format import number
-from gradient_routes.bench.render.picking import grouped, sorted_by, tabulate
+from gradient_routes.bench.render.picking import tabulate
 from gradient_routes.bench.render.source import Source
-from gradient_routes.bench.render.style import Style, of_route
-
-QUOTIENTS = {"error_one_sided": ("one-sided", "fd-one-sided"), "error_central": ("central", "fd-central")}
-TIGHTENED = Style("#0072B2", "circle", "5 3", hollow=True)
-WHAT = ("problem", "route", "at")
+from gradient_routes.bench.verification.page import LOOKS, OFF, QUOTIENTS, STEP, TIGHTENED
 
 
 def section(source: Source) -> Section | None:
     checks = sorted(source.table("checks"), key=lambda check: check["verdict"] == "agrees")
     if not checks:
         return None
-    figures = (verdicts(checks), curves(checks, source.table("points")))
-    says = "Is the gradient right? Difference quotients at every step, read as a curve: slopes 1 and 2, then round-off."
-    return Section("vcurves", "V-curves and verdicts", says, tuple(f for f in figures if f is not None))
+    points = source.table("points")
+    figures = (verdicts(checks), *([curves(checks, points)] if points else []))
+    says = (
+        "Is the gradient right? Difference quotients at every step: where it is, their error falls with slope 1"
+        " (one-sided) or 2 (central) until round-off."
+    )
+    return Section("vcurves", "V-curves and verdicts", says, figures)
 
 
 def verdicts(checks: Sequence[Row]) -> Figure:
@@ -39,52 +39,41 @@ def verdicts(checks: Sequence[Row]) -> Figure:
     )
 
 
-def curves(checks: Sequence[Row], points: Sequence[Row]) -> Figure | None:
+def curves(checks: Sequence[Row], points: Sequence[Row]) -> Figure:
     """One panel a check, worst verdicts first: a line for each quotient along each line."""
-    if not points:
-        return None
-    known = {tuple(check[name] for name in WHAT): check for check in checks}
-    panels = grouped(points, lambda row: tuple(row[name] for name in WHAT))
-    order = sorted(panels, key=lambda what: known.get(what, {}).get("verdict") == "agrees")
-    facets, series = [], []
-    for facet, what in enumerate(order):
-        facets.append(_facet(what, known.get(what)))
-        of = [points[i] for i in panels[what]]
-        for (_, tightened), places in grouped(of, lambda row: (row["line"], row["tightened"])).items():
-            line = sorted_by(points, (panels[what][i] for i in places), "step")
-            series += _series(points, line, tightened, facet)
+    order = {named(check): k for k, check in enumerate(checks)}
+    points = sorted(points, key=lambda row: order.get(named(row), len(order)))
     floors = [check["floor"] for check in checks if check["verdict"] == "agrees" and check["floor"] is not None]
-    says = f" Gradients that agree reach {number(min(floors), 2)} at best." if floors else ""
+    reached = f" Gradients that agree reach {number(min(floors), 2)} at best." if floors else ""
+    lines = {key: k for k, key in enumerate(dict.fromkeys(map(line, points)))}
+    columns = "problem route at line line_says tightened step error_one_sided error_central slope"
     return Figure(
         "v-curves",
         "Error of difference quotients against the step",
-        f"|quotient − g·v|, relative; a wrong gradient shows as a plateau that no step removes.{says}",
-        tabulate(
-            "points", points, "problem route at line line_says tightened step error_one_sided error_central slope"
-        ),
-        x=(Axis("step", "h, relative", scale="log"),),
-        y=(Axis("error_central", "error", scale="log"),),
-        series=tuple(series),
-        facets=tuple(facets),
+        "Each line is one direction v in the space of parameters. A wrong gradient shows as a plateau that no step"
+        f" removes.{reached}",
+        tabulate("points", points, columns),
+        "line",
+        x=(STEP,),
+        y=(OFF,),
+        series=tuple("" if row["tightened"] in (1.0, None) else TIGHTENED for row in points),
+        panels=tuple(map(named, points)),
+        lines=tuple(lines[line(row)] for row in points),
+        fold=QUOTIENTS,
+        looks=LOOKS,
+        told={named(check): told(check) for check in checks},
     )
 
 
-def _facet(what: tuple[str, ...], check: Row | None) -> Facet:
-    problem, route, at = what
-    name = f"{problem} by {route}" if route else str(problem)
-    name += "" if at in ("start", None) else f", at {at}"
-    if check is None:
-        return Facet(name)
+def line(row: Row) -> tuple[str, str, float | None]:
+    return named(row), row["line"], row["tightened"]
+
+
+def named(row: Row) -> str:
+    name = f"{row['problem']} by {row['route']}" if row["route"] else str(row["problem"])
+    return name if row["at"] in ("start", None) else f"{name}, at {row['at']}"
+
+
+def told(check: Row) -> Told:
     said = [check["says"], f"Next: {check['next']}" if check["next"] else None]
-    return Facet(name, check["verdict"] or "", " ".join(f"{part.rstrip('.')}." for part in said if part))
-
-
-def _series(points: Sequence[Row], line: tuple[int, ...], tightened: float | None, facet: int) -> list[Series]:
-    made = []
-    for column, (name, route) in QUOTIENTS.items():
-        if any(points[i][column] is not None for i in line):
-            if tightened in (1.0, None):
-                made.append(Series(name, of_route(route), line, facet, y=column))
-            elif column == "error_central":
-                made.append(Series("central, solve tightened", TIGHTENED, line, facet, y=column))
-    return made
+    return Told(check["verdict"] or "", " ".join(f"{part.rstrip('.')}." for part in said if part))
