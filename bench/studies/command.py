@@ -55,6 +55,7 @@ def _call(
     **given: Any,
 ) -> None:
     from gradient_routes.bench.execution.isolation.run import here, stream
+    from gradient_routes.bench.execution.isolation.signals import interruptible
     from gradient_routes.bench.studies.job import RunStudy, Screen
     from gradient_routes.bench.studies.session import Session
 
@@ -65,6 +66,7 @@ def _call(
         given |= {"isolate": isolate, "limits": limits}
     job = RunStudy(study.name, given | {"kept": kept}, Screen.of(sys.stdout), as_json, not no_plot)
     session = Session(study, kept, as_json)
+    interruptible()  # SIGTERM acts like Ctrl-C
     if study.confined and isolate:
         for message in stream(job, limits, last_words=LAST if study.keeps else 0.0):
             session.hear(message)

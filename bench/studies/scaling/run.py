@@ -19,7 +19,6 @@ from gradient_routes.bench.cases.study import Kept, Say
 from gradient_routes.bench.command_options import checked, debugging, refuse_given
 from gradient_routes.bench.execution.executors.isolated import called
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.signals import interruptible
 from gradient_routes.bench.execution.sweep import How
 from gradient_routes.bench.execution.sweep import run as run_cases
 from gradient_routes.bench.render.terminal.tables import titled
@@ -56,7 +55,6 @@ def run(
     specs = routes_of(routes, say)
     settings = Settings(at, checked(budget), min_time, solver=solver)
     lost: list[str] = []
-    interruptible()  # SIGTERM ends it like Ctrl-C: with tables
     if not isolate:
         limits.pin()
     measure = partial(run_cases, how=How(isolate, limits))

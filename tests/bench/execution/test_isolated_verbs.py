@@ -135,8 +135,9 @@ import os, signal, time
 
 class Deaf(Counted):
     def linearize(self, u, p):
-        if os.path.exists("gradients") and os.path.getsize("gradients") > 9:
+        if os.path.exists("gradients") and os.path.getsize("gradients") > 8:
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+            super().linearize(u, p)  # the gradient at which the limit is met
             time.sleep(987)
         return super().linearize(u, p)
 """
