@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import copy
 import hashlib
 import os
 import shutil
@@ -43,13 +42,12 @@ AREAS = {  # folder -> its tests; those that import the mutated module run first
     "routes": ("tests/routes", "tests/problems"),
     "bench/verification": ("tests/bench/verification", "tests/bench/studies/test_check_cli.py"),
 }
+UNCOPIED = shutil.ignore_patterns(".*", "__pycache__", "results", "build", "dist", "*.egg-info", "docs")
 LEFT_OUT = {"view.py", "page.py", "table.py", "messages.py", "test_mutants.py"}  # words, pictures and ourselves
 SKIPPED = (ast.JoinedStr, ast.Assert, ast.Raise, ast.arg, ast.AnnAssign)  # messages and annotations
-PAIRS = (
-    *((ast.Lt, ast.LtE), (ast.Gt, ast.GtE), (ast.Eq, ast.NotEq), (ast.Is, ast.IsNot), (ast.In, ast.NotIn)),
-    *((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.And, ast.Or)),
-)
-OTHER: dict[type[ast.AST], Any] = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}
+LEFT = (ast.Lt, ast.Gt, ast.Eq, ast.Is, ast.In, ast.Add, ast.Mult, ast.And)
+RIGHT = (ast.LtE, ast.GtE, ast.NotEq, ast.IsNot, ast.NotIn, ast.Sub, ast.Div, ast.Or)
+OTHER: dict[type[ast.AST], Any] = dict(zip(LEFT + RIGHT, RIGHT + LEFT, strict=True))
 
 
 @dataclass(frozen=True)
@@ -93,9 +91,7 @@ def faults(node: ast.AST) -> Iterator[tuple[str, ast.expr, ast.expr]]:
 
 
 def changed(node: ast.expr, **fields: Any) -> ast.expr:
-    new = copy.copy(node)
-    vars(new).update(fields)
-    return new
+    return type(node)(**{**vars(node), **fields})
 
 
 def mutants(area: str, path: Path) -> Iterator[Mutant]:
@@ -116,29 +112,20 @@ def mutants(area: str, path: Path) -> Iterator[Mutant]:
         ignored = [getattr(node, "returns", None), *getattr(node, "decorator_list", ())]
         for child in ast.iter_child_nodes(node):
             if child not in ignored and not isinstance(child, SKIPPED):
-                named = isinstance(child, ast.FunctionDef | ast.ClassDef)
-                yield from walk(child, f"{where}.{child.name}".lstrip(".") if named else where)
+                inner = [where, child.name] if isinstance(child, ast.FunctionDef | ast.ClassDef) else [where]
+                yield from walk(child, ".".join(inner).lstrip("."))
 
     yield from walk(ast.parse(source), "")
 
 
 def sample(seed: int = SEED) -> list[Mutant]:
     """The same number of every area, in the order of their ids."""
-
-    def rank(mutant: Mutant) -> str:
-        return hashlib.sha256(f"{seed} {mutant.id}".encode()).hexdigest()
-
     chosen: list[Mutant] = []
     for area in AREAS:
         files = [path for path in sorted((ROOT / area).rglob("*.py")) if path.name not in LEFT_OUT]
-        chosen += sorted((m for path in files for m in mutants(area, path)), key=rank)[:EACH]
+        every = (m for path in files for m in mutants(area, path))
+        chosen += sorted(every, key=lambda m: hashlib.sha256(f"{seed} {m.id}".encode()).digest())[:EACH]
     return sorted(chosen, key=lambda m: m.id)
-
-
-def copied(folder: Path) -> Path:
-    """The tree without what is built, stored or cached."""
-    left_out = shutil.ignore_patterns(".*", "__pycache__", "results", "build", "dist", "*.egg-info", "docs")
-    return Path(shutil.copytree(ROOT, folder, symlinks=True, ignore=left_out))
 
 
 def passes(tree: Path, area: str, file: str, limit: float | None = None) -> bool:
@@ -149,8 +136,8 @@ def passes(tree: Path, area: str, file: str, limit: float | None = None) -> bool
     tests.sort(key=lambda path: module not in path.read_text())
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *map(str, tests)]
     environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
-    quiet = subprocess.DEVNULL
-    child = subprocess.Popen(command, cwd=tree, env=environment, stdout=quiet, stderr=quiet, start_new_session=True)
+    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    child = subprocess.Popen(command, cwd=tree, env=environment, start_new_session=True, **quiet)
     try:
         return child.wait(limit) == 0
     except subprocess.TimeoutExpired:
@@ -189,7 +176,7 @@ def survivors(chosen: list[Mutant], trees: SimpleQueue[Path], jobs: int) -> list
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", metavar="TEXT", help="mutants whose id contains this")
-    parser.add_argument("--list", action="store_true", help="print the sample and stop")
+    parser.add_argument("--list", action="store_true", help="print the sample")
     parser.add_argument("--jobs", type=int, default=1, help="mutants at a time")
     given = parser.parse_args()
     chosen, reasons = [m for m in sample() if given.only in m.id], tomllib.loads(REASONS.read_text())
@@ -198,7 +185,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             trees: SimpleQueue[Path] = SimpleQueue()
             for k in range(given.jobs):
-                trees.put(copied(Path(folder) / str(k)))
+                trees.put(Path(shutil.copytree(ROOT, Path(folder) / str(k), symlinks=True, ignore=UNCOPIED)))
             shown = survivors(chosen, trees, given.jobs)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("mutant" if given.list else "survivor", "change", "reason"):
