@@ -99,6 +99,17 @@ def test_tables_fit_80_columns(cli, monkeypatch: pytest.MonkeyPatch, verb: str) 
     assert "1 fwd" in out[0]
 
 
+def test_lists_and_gradients_fit_80_columns(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    listed = cli("list").out
+    assert max(map(len, listed.splitlines())) <= 80
+    assert "fault=sign|factor|transpose|missing-term|stale|loose|functional|otd|scale\n" in listed
+    assert "…" not in listed
+    shown = run(cli, "--gradient").out.partition("bar by adjoint\n")[2]
+    assert max(map(len, shown.splitlines())) <= 80
+    assert "-0.00962261" in shown
+
+
 def test_gradient_view_shows_strains_and_the_blind(cli) -> None:
     out = run(cli, "--gradient").out
     assert "eps[u]" in out

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from gradient_routes.bench.command_options import debug_option
+
+if TYPE_CHECKING:
+    from gradient_routes.bench.cases.registry import Kind
 
 
 @click.command("list")
@@ -16,7 +21,8 @@ def list_(what: str | None) -> None:
     from gradient_routes.bench.render.terminal.tables import console
 
     out = console()
-    if what != "routes":
-        out.print(listing("problem"))
-    if what != "problems":
-        out.print(listing("route"))
+    kinds: list[Kind] = ["problem", "route"]
+    for kind in kinds:
+        if what in (None, f"{kind}s"):
+            for line in listing(kind, out.width):
+                out.print(line, soft_wrap=True)

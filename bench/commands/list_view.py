@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from textwrap import wrap
 from typing import Any
 
-from rich.console import Group
-from rich.padding import Padding
-from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.cases import registry
@@ -16,30 +15,47 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Problem, offer_names
 from gradient_routes.routes.route import Route
 
+INDENT = "  "
 
-def listing(kind: registry.Kind) -> Group:
-    """All problems or all routes."""
-    blocks: list[Any] = [Text(f"{kind}s", style="bold")]
+
+def listing(kind: registry.Kind, width: int) -> Iterator[Text]:
+    """The lines about all problems or all routes."""
+    yield Text(f"{kind}s", style="bold")
     for entry in registry.registered(kind):
-        blocks.append(Padding(_block(kind, entry), (0, 0, 1, 2), expand=False))
-    return Group(*blocks)
+        for text, style in _block(kind, entry, width - len(INDENT)):
+            yield Text(INDENT + text, style=style)
+        yield Text("")
 
 
-def _block(kind: registry.Kind, entry: registry.Entry) -> Group:
+def _block(kind: registry.Kind, entry: registry.Entry, width: int) -> Iterator[tuple[str, str]]:
+    """Lines and their styles."""
     origin = "" if entry.origin == registry.BUILT_IN else f"  (from {entry.origin})"
-    name = Text(entry.name + origin, style=f"bold {route_style(entry.name)}")
+    yield entry.name + origin, f"bold {route_style(entry.name)}"
     if registry.entries(kind)[entry.name] is not entry:
-        return Group(name, Text(f"hidden by the {kind} of the same name above", style="red"))
-    options = Table(box=None, pad_edge=False, show_header=False)
-    options.add_column(no_wrap=True)
-    options.add_column()
+        yield f"hidden by the {kind} of the same name above", "red"
+        return
     try:
         target = entry.load()
-        for option in options_of(registry.factory_of(target)).values():
-            options.add_row(Text(option.text), Text(option.help))
+        options = [(option.text, option.help) for option in options_of(registry.factory_of(target)).values()]
     except InputError as error:
-        return Group(name, Text(str(error), style="red"))
-    return Group(name, Text(_summary(target)), Text(f"{_contract(kind, target)}", style="dim"), options)
+        yield from ((line, "red") for line in wrap(str(error), width))
+        return
+    yield from ((line, "") for line in wrap(_summary(target), width))
+    yield _contract(kind, target), "dim"
+    yield from ((line, "") for line in _described(options, width))
+
+
+def _described(options: list[tuple[str, str]], width: int) -> Iterator[str]:
+    """Options and their help in two columns; an option longer than half the width has a line of its own."""
+    column = max((len(option) for option, _ in options if len(option) <= width // 2), default=0) + 2
+    for option, help in options:
+        lines = wrap(help, max(width - column, 20)) or [""]
+        if len(option) > column - 2:
+            yield option
+            option = ""
+        for line in lines:
+            yield f"{option:<{column}}{line}".rstrip()
+            option = ""
 
 
 def _summary(target: Any) -> str:

@@ -151,7 +151,9 @@ def gradient(row: Row, view: View) -> TextTable:
     columns |= view.columns.columns
     blind = view.columns.blind
     marks = [] if blind is None else [""]
-    table = TextTable(["p", *columns, *marks], frozenset(range(1, 1 + len(columns))))
+    units = set(view.units)
+    unit = f" [{units.pop()}]" if len(units) == 1 else None  # of all: said once
+    table = TextTable([f"p{unit or ''}", *columns, *marks], frozenset(range(1, 1 + len(columns))))
     n = len(view.labels)
     shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
     for i in shown:
@@ -163,5 +165,6 @@ def gradient(row: Row, view: View) -> TextTable:
         cells = [Text(f"{values[i]:.6g}", style=style) for values in columns.values()]
         cells[0].style = style or route_style(row["route"])
         cells += [Text(view.columns.mark if hidden else "", style=style) for _ in marks]
-        table.row(Text(f"{view.labels[i]} [{view.units[i]}]", style=style), cells)
+        label = view.labels[i] if unit else f"{view.labels[i]} [{view.units[i]}]"
+        table.row(Text(label, style=style), cells)
     return table
