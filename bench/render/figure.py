@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 from gradient_routes.bench.cases import registry
@@ -123,13 +124,18 @@ class Figure:
     z: Axis = Axis("", "")
     sides: tuple[str, str] = ("", "")
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
-        """Of all series; routes in the order of the story, others in that of rows."""
+        """Of all series that have a value; routes in the order of the story, others in that of rows."""
         ends = list(dict.fromkeys(self.series or [""]))
         if self.routes:
             ends.sort(key=lambda name: registry.place(bare(name)))
-        return [f"{column}{end}" for end in ends for column in (self.fold.values() or [""])]
+        if not self.fold:
+            return ends
+        rows = self.series or ("",) * len(self.table.rows)
+        values = {name: self.table.column(column) for column, name in self.fold.items()}
+        known = {name + end for name, of in values.items() for end, v in zip(rows, of, strict=True) if v is not None}
+        return [name + end for end in ends for name in values if name + end in known]
 
 
 @dataclass(frozen=True)

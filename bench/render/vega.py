@@ -91,8 +91,8 @@ def overlaps(figure: Figure) -> str:
     """The curves of a figure that lie on each other, in words."""
     covered = View(figure, figure.x[0], figure.y[0]).covered if figure.mark else []
     pairs = list(dict.fromkeys((under, over) for _, under, over in covered))
-    told = "; ".join(f"{under} and {over}" for under, over in pairs[:MANY]) + ("; ..." if len(pairs) > MANY else "")
-    return f" The wider line is seen below one that lies on it: {told}." if pairs else ""
+    told = [f"{under} and {over}" for under, over in pairs[:MANY]] + ["and others"] * (len(pairs) > MANY)
+    return f" The wider line is seen below one that lies on it: {'; '.join(told)}." if pairs else ""
 
 
 def records(figure: Figure) -> list[Spec]:

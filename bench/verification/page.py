@@ -62,7 +62,7 @@ def section(check: Check) -> Section:
     figures += [curves(check)] if check.deciding else []
     if check.located is not None and check.located.worst:
         worst = [(w.name, w.given, w.found, w.factor) for w in check.located.worst]
-        figures.append(table("components", "Wrong components", "The largest differences.", COMPONENTS, worst))
+        figures.append(table("components", "Wrong components", "Those that are off by most.", COMPONENTS, worst))
     if check.findings:
         found = [
             (f.name, SOUND[f.sound], f.value, f.limit, "; ".join(filter(None, (f.says, f.culprit))))
@@ -71,7 +71,7 @@ def section(check: Check) -> Section:
         figures.append(table("findings", "Second evidence", "Tests of another kind.", FINDINGS, found))
     counted = f"{check.calls} objective calls, gradients: {check.gradients}"
     notes = tuple(Note("note:", remark) for remark in (*check.not_done, *check.remarks, counted))
-    return Section("check", check.verdict, f"Next: {check.todo}", tuple(figures), notes=notes)
+    return Section("check", "What the verdict rests on", f"Next: {check.todo}", tuple(figures), notes=notes)
 
 
 def table(id: str, title: str, says: str, columns: Sequence[Column], cells: Sequence[Sequence[Any]]) -> Figure:
@@ -108,4 +108,5 @@ def _points(reading: Reading, factor: float) -> Iterator[dict[str, Any]]:
     for h, one_sided, central in zip(made.h.tolist(), *errors.tolist(), strict=True):
         noise = (reading.noise or 0.0) / (math.sqrt(2.0) * h) / scale
         seen = {"noise": noise if factor == 1.0 and noise >= least else None, "factor": factor}
-        yield {"line": made.line.name, "step": h, "error_one_sided": one_sided, "error_central": central} | seen
+        known = {"error_one_sided": one_sided if factor == 1.0 else None, "error_central": central}
+        yield {"line": made.line.name, "step": h} | known | seen

@@ -94,7 +94,7 @@ def test_a_page_is_written(cli, tmp_path: Path) -> None:
     assert ran.code == 1
     page = (tmp_path / "page.html").read_text()
     assert "wrong-gradient" in page
-    assert len(set(re.findall('"(along [^"]+)"', page))) == 3
+    assert len(set(re.findall(r'"(along [^"\\]+)"', page))) == 3
     library = max(re.findall(r"<script>.*?</script>", page, re.DOTALL), key=len)
     assert not re.search("https?:", page.replace(library, "")), "a page needs nothing else"
     assert "default-src 'none'" in page
