@@ -17,7 +17,7 @@ from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Route
 
 JUDGES = ("complex-step", "tangent")  # where a problem knows no closed form; never the judged route itself
-MANY = 200  # parameters; beyond, these judge in random directions: the whole costs too much to be run unasked
+WHOLE = 200  # parameters; beyond, these judge in random directions: the whole costs too much to be run unasked
 DIRECTIONS, SEED = 3, 20260  # no direction a user's --seed would name
 SAME = 1e-6  # of J: no tolerance of a forward solve, another state
 CANCELLED = 1e3  # eps, what condition numbers make of rounding in the terms of a gradient
@@ -72,7 +72,7 @@ class Judges:
 
     def _candidates(self) -> Iterator[tuple[str, bool]]:
         yield OWN, True
-        yield from ((name, True) for name in JUDGES if len(self.p) <= MANY)
+        yield from ((name, True) for name in JUDGES if len(self.p) <= WHOLE)
         yield from ((name, False) for name in JUDGES)
 
     def _ask(self, name: str, whole: bool) -> Judge | str:

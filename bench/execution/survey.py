@@ -13,8 +13,8 @@ from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.status import FOREIGN
 from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.line import Line
 from gradient_routes.bench.execution.isolation.messages import Returned
+from gradient_routes.bench.execution.isolation.worker_process import WorkerProcess
 from gradient_routes.bench.execution.pruning import Size
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
@@ -40,7 +40,7 @@ def sizes(problems: list[ProblemSpec], settings: Settings, limits: Limits | None
         return [_understood(surveyed(problem, settings.at)) for problem in problems]
     found: list[Size | None] = []
     while len(found) < len(problems):
-        with closing(Line(Survey(problems[len(found) :], settings), limits)) as line:
+        with closing(WorkerProcess(Survey(problems[len(found) :], settings), limits)) as line:
             while len(found) < len(problems) and isinstance(message := line.hear(), Returned):
                 found.append(_understood(message.value))
         if len(found) < len(problems):

@@ -10,7 +10,7 @@ from gradient_routes.bench.render.style import FAINT, INK, PAPER, SOFT
 from gradient_routes.bench.render.view import Spec, View, calculate, datum
 
 FIRST = 6  # panels shown before one asks for all
-MANY = 3  # pairs of curves that are named
+NAMED = 3  # pairs of curves that are named
 CONFIG: Spec = {
     "background": PAPER,
     "font": "Liberation Sans, Arial, Helvetica, sans-serif",
@@ -91,7 +91,7 @@ def overlaps(figure: Figure) -> str:
     """The curves of a figure that lie on each other, in words."""
     covered = View(figure, figure.x[0], figure.y[0]).covered if figure.mark else []
     pairs = list(dict.fromkeys((under, over) for _, under, over in covered))
-    told = [f"{under} and {over}" for under, over in pairs[:MANY]] + ["and others"] * (len(pairs) > MANY)
+    told = [f"{under} and {over}" for under, over in pairs[:NAMED]] + ["and others"] * (len(pairs) > NAMED)
     return f" The wider line is seen below one that lies on it: {'; '.join(told)}." if pairs else ""
 
 

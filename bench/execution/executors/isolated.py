@@ -14,7 +14,6 @@ from gradient_routes.bench.execution.cluster.shipped_case import ShippedCase
 from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.channel import Call
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.line import Line
 from gradient_routes.bench.execution.isolation.messages import (
     Begun,
     Done,
@@ -28,6 +27,7 @@ from gradient_routes.bench.execution.isolation.messages import (
     Turned,
 )
 from gradient_routes.bench.execution.isolation.stack import where as located
+from gradient_routes.bench.execution.isolation.worker_process import WorkerProcess
 from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.bench.execution.references import Found
 from gradient_routes.problems.errors import InputError, RoutesError
@@ -45,7 +45,7 @@ class Isolated:
         self._phase = "its start"
         self._environment: Environment | None = None
         self._ended: Outcome | None = None
-        self._line = Line(replace(job, found=dict(job.found)), limits, cwd=cwd)
+        self._line = WorkerProcess(replace(job, found=dict(job.found)), limits, cwd=cwd)
 
     def prepared(self) -> Outcome | None:
         return self._until(Ready)
@@ -118,7 +118,7 @@ class Isolated:
 def called(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Limits) -> Any:
     """What a function of a module returns in a process of its own. Raises RoutesError where that ends before."""
     job = Call(function, arguments)
-    with closing(Line(job, limits)) as line:
+    with closing(WorkerProcess(job, limits)) as line:
         message = line.hear()
     if isinstance(message, Returned):
         return message.value

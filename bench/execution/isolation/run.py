@@ -8,9 +8,9 @@ from contextlib import closing
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.execution.isolation.channel import Channel, Job, ended
 from gradient_routes.bench.execution.isolation.limits import Limits
-from gradient_routes.bench.execution.isolation.line import Line
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.execution.isolation.signals import Interrupt
+from gradient_routes.bench.execution.isolation.worker_process import WorkerProcess
 
 GRACE = 5.0  # [s] between an interrupt and the end of a job that does not react to it
 
@@ -22,7 +22,7 @@ def stream(job: Job, limits: Limits, *, echo: bool = True, last_words: float = 0
     has; then it is killed with all it started. Where it uses too much memory it is killed at once. Ctrl-C does not
     interrupt who takes a message; a second one does. `echo`: its stderr appears on that of this process.
     """
-    with closing(Line(job, limits, echo=echo, last_words=last_words)) as line, Interrupt() as interrupt:
+    with closing(WorkerProcess(job, limits, echo=echo, last_words=last_words)) as line, Interrupt() as interrupt:
         look, message = interrupt.heard, None
         while not isinstance(message, Ended):
             try:

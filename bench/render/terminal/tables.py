@@ -20,7 +20,7 @@ from gradient_routes.bench.render.terminal.text_table import TextTable
 PIPED_WIDTH = 160  # columns where there is no terminal to ask
 DEFAULTS = vars(Settings().solver)
 RESOLUTION = 2**20  # bytes; smaller peaks are noise of allocators and the interpreter
-MANY = 64  # parameters; longer views show the first and the last of them
+LONGEST = 64  # lines; of longer lists the first and the last are shown
 
 
 def console(stderr: bool = False) -> Console:
@@ -81,3 +81,14 @@ def asked(row: Row) -> str:
     unusual += [] if settings.get("timed", True) else ["not timed"]
     unusual += [] if settings.get("threads", 1) == 1 else [f"{settings['threads']} threads"]
     return ", ".join([titled(row), *unusual])
+
+
+def ends(n: int) -> list[int | None]:
+    """Indices of the lines to show of n, None where some are left out."""
+    half = LONGEST // 2
+    return [*range(n)] if n <= LONGEST else [*range(half), None, *range(n - half, n)]
+
+
+def left_out(n: int) -> str:
+    """What stands in place of the lines left out."""
+    return f"... {n - LONGEST} more"

@@ -18,7 +18,7 @@ from gradient_routes.bench.execution.isolation.stack import without
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
-from gradient_routes.bench.render.terminal.tables import MANY, RESOLUTION, named, say, titled
+from gradient_routes.bench.render.terminal.tables import RESOLUTION, ends, left_out, named, say, titled
 from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.routes.tally import Work
 
@@ -155,10 +155,9 @@ def gradient(row: Row, view: View) -> TextTable:
     unit = f" [{units.pop()}]" if len(units) == 1 else None  # of all: said once
     table = TextTable([f"p{unit or ''}", *columns, *marks], frozenset(range(1, 1 + len(columns))))
     n = len(view.labels)
-    shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
-    for i in shown:
+    for i in ends(n):
         if i is None:
-            table.row(Text(f"... {n - MANY} more", style="dim"), [Text("")] * (len(columns) + len(marks)))
+            table.row(Text(left_out(n), style="dim"), [Text("")] * (len(columns) + len(marks)))
             continue
         hidden = blind is not None and bool(blind[i])
         style = "dim" if hidden else ""

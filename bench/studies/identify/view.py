@@ -12,7 +12,6 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
-from gradient_routes.bench.render.terminal.tables import MANY
 from gradient_routes.bench.studies.identify.identifiability import Identified
 from gradient_routes.bench.studies.identify.measure import Determined
 from gradient_routes.bench.studies.identify.placement import Placement
@@ -103,7 +102,7 @@ def elements(one: Identified, width: int) -> Text:
     else:
         ends = [i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]]
         runs = zip([0, *ends], [*ends, len(kinds)], strict=True)
-        text.append(", ".join(f"{start + 1}..{end} {kinds[start]}" for start, end in [*runs][:MANY]))
+        text.append(", ".join(f"{start + 1}..{end} {kinds[start]}" for start, end in [*runs][: tables.LONGEST]))
     return text.append("   " + ", ".join(f"{mark} {kind}" for kind, mark in KINDS.items()), style="dim")
 
 
@@ -117,10 +116,9 @@ def parameters(one: Identified, rows: Sequence[Row]) -> Table:
         out.add_column(name, justify="right", no_wrap=True)
     out.add_column("")
     n = len(rows)
-    shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
-    for i in shown:
+    for i in tables.ends(n):
         if i is None:
-            out.add_row(f"... {n - MANY} more", style="dim")
+            out.add_row(tables.left_out(n), style="dim")
             continue
         row = rows[i]
         cells = [number(row[axis]) for axis in axes]

@@ -28,7 +28,7 @@ LEGEND = (
     "fwd, adj: forward solves, and linearized or transposed ones, so far; |step|: in natural changes of p;"
     " off: |p - p_true| / |p_0 - p_true|"
 )
-MANY = 40  # parameters; of more, both ends are shown
+FIELD = 40  # parameters from which a field on a box is drawn
 COORDINATES = ("x", "y", "z")
 SAME = 1e-6  # of J
 BARS = 12  # characters of the longest bar
@@ -148,10 +148,9 @@ def estimates(found: Inversion) -> Table:
     for name in names:
         table.add_column(Text(name), justify="left" if name in ("p", "") else "right")
     n, largest = found.n_param, float(np.abs(found.p).max()) or 1.0
-    shown: list[int | None] = [*range(n)] if n <= MANY else [*range(MANY // 2), None, *range(n - MANY // 2, n)]
-    for i in shown:
+    for i in tables.ends(n):
         if i is None:
-            table.add_row(f"... {n - MANY} more", style="dim")
+            table.add_row(tables.left_out(n), style="dim")
             continue
         hidden = found.view.blind is not None and bool(found.view.blind[i])
         values = [found.start[i], found.p[i], *([] if found.truth is None else [found.truth[i]]), found.gradient[i]]
@@ -165,7 +164,7 @@ def estimates(found: Inversion) -> Table:
 def cells(found: Inversion) -> Text:
     """The estimate of a field on a box in its middle slice, cell by cell, beside the truth; blind cells masked."""
     position, p = found.made.parameters.position, found.p
-    if position is None or position.shape[1] != 3 or found.n_param < MANY or not np.isfinite(p).all():
+    if position is None or position.shape[1] != 3 or found.n_param < FIELD or not np.isfinite(p).all():
         return Text()
     middle = np.unique(position[:, 1].round(9))
     at = np.flatnonzero(np.isclose(position[:, 1], middle[len(middle) // 2]))

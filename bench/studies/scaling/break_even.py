@@ -15,7 +15,7 @@ from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices
 from gradient_routes.bench.studies.judged import said
 from gradient_routes.bench.studies.scaling.climbing import Series
-from gradient_routes.bench.studies.scaling.crossing import FEWEST, Crossing, Line, cheaper, crossing, exact, line
+from gradient_routes.bench.studies.scaling.crossing import FEWEST, CostLine, Crossing, cheaper, crossing, exact, line
 from gradient_routes.bench.studies.scaling.race import MOST_PARAMETERS, NUMBERS, ROUNDS, Race, doublings, race
 from gradient_routes.bench.studies.scaling.sizes import Sizes
 from gradient_routes.bench.units import duration
@@ -155,7 +155,7 @@ def compared(
     )
 
 
-def predicted(spec: RouteSpec, own: Prices) -> Line:
+def predicted(spec: RouteSpec, own: Prices) -> CostLine:
     """The declared bill over the number of parameters, which is a line."""
     one, many = (own.seconds(spec.route.cost(m, own.declared, **spec.options)) for m in (1, MOST_PARAMETERS))
     each = (many - one) / (MOST_PARAMETERS - 1)

@@ -14,7 +14,7 @@ FEWEST = 3  # points of a line that knows its errors
 
 
 @dataclass(frozen=True)
-class Line:
+class CostLine:
     """t = fixed + each m, the covariance (2, 2) of the two, and the degrees of freedom that is known with."""
 
     fixed: float
@@ -35,7 +35,7 @@ class Crossing:
     high: float | None = None
 
 
-def line(m: Sequence[float], t: Sequence[float]) -> Line:
+def line(m: Sequence[float], t: Sequence[float]) -> CostLine:
     """Least squares of relative errors through at least FEWEST points, with a slope >= 0.
 
     No parameter costs less than nothing: a slope that noise makes negative is 0, which errs by less, and the covariance
@@ -49,15 +49,15 @@ def line(m: Sequence[float], t: Sequence[float]) -> Line:
     covariance = np.linalg.inv(A.T @ A) * (left @ left) / freedom
     if each < 0.0:
         fixed, each = A[:, 0].sum() / (A[:, 0] @ A[:, 0]), 0.0
-    return Line(float(fixed), float(each), covariance, freedom)
+    return CostLine(float(fixed), float(each), covariance, freedom)
 
 
-def exact(fixed: float, each: float) -> Line:
+def exact(fixed: float, each: float) -> CostLine:
     """A line known without errors."""
-    return Line(fixed, each, np.zeros((2, 2)), 1)
+    return CostLine(fixed, each, np.zeros((2, 2)), 1)
 
 
-def crossing(first: Line, second: Line) -> Crossing:
+def crossing(first: CostLine, second: CostLine) -> Crossing:
     """The m that a test at the level of CONFIDENCE does not exclude as the crossing (Fieller 1954).
 
     The errors of the two are taken as independent, with the fewer degrees of freedom of both.
@@ -76,7 +76,7 @@ def crossing(first: Line, second: Line) -> Crossing:
     return Crossing(-a / b + 0.0, float((-half - root) / square), high)
 
 
-def cheaper(names: tuple[str, str], lines: tuple[Line, Line], m_measured: float) -> str:
+def cheaper(names: tuple[str, str], lines: tuple[CostLine, CostLine], m_measured: float) -> str:
     """Who is cheaper where, in words; from m = 1 on."""
     first, second = lines
     if not _told_apart(*lines):
@@ -88,7 +88,7 @@ def cheaper(names: tuple[str, str], lines: tuple[Line, Line], m_measured: float)
     return f"{names[many]} is cheaper from n_p = {int(np.floor(met)) + 1} on"
 
 
-def _told_apart(first: Line, second: Line) -> bool:
+def _told_apart(first: CostLine, second: CostLine) -> bool:
     from scipy.stats import t
 
     limit = float(t.ppf(0.5 + CONFIDENCE / 2, min(first.freedom, second.freedom)))
@@ -96,7 +96,7 @@ def _told_apart(first: Line, second: Line) -> bool:
     return bool(abs(first.each - second.each) > limit * np.sqrt(variance))
 
 
-def _parallel(names: tuple[str, str], lines: tuple[Line, Line], m: float) -> str:
+def _parallel(names: tuple[str, str], lines: tuple[CostLine, CostLine], m: float) -> str:
     first, second = lines
     name = names[int(first(m) > second(m))]
     return f"not told apart by what a parameter costs; at n_p = {m:.3g} {name} is cheaper"

@@ -37,7 +37,7 @@ FEW = 32  # unknowns up to which conjugate gradients are exact before they are a
 
 
 @dataclass(frozen=True)
-class Sweep:
+class ToleranceSweep:
     """Tolerances, loosest first; `forward` or `adjoint` is a tolerance that stays as it is instead."""
 
     tolerances: tuple[float, ...]
@@ -138,7 +138,7 @@ def run(
 
 def sweep_of(
     tolerances: tuple[float, ...], sweep: Swept | None, rtol: float | None, adjoint_rtol: float | None
-) -> Sweep:
+) -> ToleranceSweep:
     """Which tolerance varies and where the other stays. Raises InputError."""
     for name, value in (("--rtol", rtol), ("--adjoint-rtol", adjoint_rtol)):
         if value is not None and not 0.0 < value < 1.0:
@@ -148,7 +148,7 @@ def sweep_of(
         raise InputError(f"--rtol {rtol:g} with the forward tolerance swept - add --sweep adjoint or drop it")
     if adjoint_rtol is not None and sweep != "forward":
         raise InputError(f"--adjoint-rtol {adjoint_rtol:g} with the adjoint's swept - take --sweep forward or drop it")
-    return Sweep(
+    return ToleranceSweep(
         tolerances,
         forward=(rtol or TIGHT) if sweep == "adjoint" else None,
         adjoint=(adjoint_rtol or TIGHT) if sweep == "forward" else None,
@@ -158,7 +158,7 @@ def sweep_of(
 def tolerance(
     problem: ProblemSpec,
     routes: Sequence[RouteSpec],
-    sweep: Sweep,
+    sweep: ToleranceSweep,
     at: str = "start",
     linear_solver: str | None = None,
     budget: float = 60.0,
@@ -205,7 +205,7 @@ def default_solver(problem: Problem) -> str:
 class Experiment:
     """One problem at one p under a sweep."""
 
-    def __init__(self, bench: Bench, sweep: Sweep, linear_solver: str, budget: float) -> None:
+    def __init__(self, bench: Bench, sweep: ToleranceSweep, linear_solver: str, budget: float) -> None:
         self.bench, self.problem, self.p = bench, bench.problem, bench.p
         self.sweep, self.linear_solver, self.budget = sweep, linear_solver, budget
         self._priced: Prices | None = None

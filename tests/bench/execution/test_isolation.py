@@ -17,8 +17,8 @@ from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution.isolation import line
 from gradient_routes.bench.execution.isolation import process as watching
+from gradient_routes.bench.execution.isolation import worker_process as line
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.pruning import Pruning
 from gradient_routes.bench.execution.sweep import How, run

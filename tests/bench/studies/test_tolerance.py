@@ -14,8 +14,8 @@ from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.tolerance.columns import TOLERANCE
 from gradient_routes.bench.studies.tolerance.measure import (
     Experiment,
-    Sweep,
     Tolerance,
+    ToleranceSweep,
     decades,
     default_solver,
     tolerance,
@@ -29,9 +29,12 @@ from gradient_routes.routes.solvers.registry import linear_solver
 ROUGH = "bar[n=24,sensors=24,noise=0.01]"  # at its true moduli conjugate gradients take many steps, not n
 
 
-def study(problem: str, *routes: str, sweep: Sweep | None = None, **options) -> Tolerance:
+LOOSE = ToleranceSweep((1e-2,))
+
+
+def study(problem: str, *routes: str, sweep: ToleranceSweep | None = None, **options) -> Tolerance:
     (spec,) = case.problems([problem])
-    return tolerance(spec, case.routes(routes), sweep or Sweep(decades(1e-1, 1e-13)), **options)
+    return tolerance(spec, case.routes(routes), sweep or ToleranceSweep(decades(1e-1, 1e-13)), **options)
 
 
 def column(done: Tolerance, name: str, route: str = "adjoint") -> np.ndarray:
@@ -66,7 +69,7 @@ def test_routes_are_wrong_in_their_own_ways() -> None:
 
 def test_unrolled_ad_iterates_longer_the_tighter_the_tolerance() -> None:
     """A few of the tolerances: every k compiles anew."""
-    done = study("bar", "unrolled-ad", sweep=Sweep((1e-1, 1e-4, 1e-8, 1e-13)), linear_solver=None)
+    done = study("bar", "unrolled-ad", sweep=ToleranceSweep((1e-1, 1e-4, 1e-8, 1e-13)), linear_solver=None)
     assert done.linear_solver == "descent"
     k = [row["route_options"]["iterations"] for row in done.rows]
     assert {row["route_options"]["inner"] for row in done.rows} == {"richardson"}
@@ -76,13 +79,13 @@ def test_unrolled_ad_iterates_longer_the_tighter_the_tolerance() -> None:
 
 @pytest.mark.parametrize("problem", ["bar", "block[n=2,law=linear]"])
 def test_the_adjoint_tolerance_alone_spoils_the_gradient_and_not_J(problem: str) -> None:
-    done = study(problem, "adjoint", "tangent", sweep=Sweep((1e-2, 1e-5), forward=1e-13))
+    done = study(problem, "adjoint", "tangent", sweep=ToleranceSweep((1e-2, 1e-5), forward=1e-13))
     for route in ("adjoint", "tangent"):
         assert (column(done, "objective_error", route) < 1e-9).all()
         error = column(done, "gradient_error", route)
         assert error[0] > 1e-4
         assert error[0] > 10 * error[1]
-    both = study(problem, "adjoint", sweep=Sweep((1e-2, 1e-5), adjoint=1e-13))
+    both = study(problem, "adjoint", sweep=ToleranceSweep((1e-2, 1e-5), adjoint=1e-13))
     assert (column(both, "adjoint_residual") < 1e-12).all()
     assert column(both, "objective_error")[0] > 1e-4
 
@@ -93,20 +96,22 @@ def test_nonlinear_problems_are_solved_as_ever() -> None:
         "krylov",
         "descent",
     )
-    done = study("block[n=2]", "adjoint", sweep=Sweep((1e-1, 1e-12)))
+    done = study("block[n=2]", "adjoint", sweep=ToleranceSweep((1e-1, 1e-12)))
     assert column(done, "gradient_error")[0] > 1e-3 > 1e-9 > column(done, "gradient_error")[1]
 
 
 def test_what_cannot_run_or_fails_is_a_row_with_its_reason(monkeypatch) -> None:
-    done = study("block[n=2]", "unrolled-ad[inner=jacobi]", "adjoint", sweep=Sweep((1e-2,)), linear_solver="descent")
+    done = study(
+        "block[n=2]", "unrolled-ad[inner=jacobi]", "adjoint", sweep=ToleranceSweep((1e-2,)), linear_solver="descent"
+    )
     skipped, loose = done.rows
     assert (skipped["status"], skipped["rtol"]) == ("skipped", None)
     assert "iterates on linear problems" in skipped["reason"]
     assert (loose["status"], loose["reason"]) == ("ok", None)
-    dear = study("bar", "fd-central", sweep=Sweep((1e-3,)), budget=1e-9)
+    dear = study("bar", "fd-central", sweep=ToleranceSweep((1e-3,)), budget=1e-9)
     assert dear.rows[0]["status"] == "skipped"
     assert "--budget inf" in dear.rows[0]["reason"]
-    singular = study("bar", "adjoint", "fd-central[step=1e3]", sweep=Sweep((1e-2, 1e-3)))
+    singular = study("bar", "adjoint", "fd-central[step=1e3]", sweep=ToleranceSweep((1e-2, 1e-3)))
     assert [row["status"] for row in singular.rows] == ["ok", "ok", "failed", "failed"]
     (line,) = remarks(singular.rows)
     assert line.plain.startswith("failed at 0.01, 0.001: fd-central")
@@ -115,7 +120,7 @@ def test_what_cannot_run_or_fails_is_a_row_with_its_reason(monkeypatch) -> None:
         "gradient_routes.routes.solvers.factorization.linear_solver",
         lambda name: shorter if name == shorter.name else linear_solver(name),
     )
-    unmet = study("bar", "adjoint", sweep=Sweep((1e-1, 1e-12)), linear_solver="descent").rows
+    unmet = study("bar", "adjoint", sweep=ToleranceSweep((1e-1, 1e-12)), linear_solver="descent").rows
     assert [row["status"] for row in unmet] == ["ok", "failed"]
     assert unmet[1]["reason"].startswith("bar: steepest descent: |b - A x| = ")
 

@@ -26,7 +26,7 @@ from gradient_routes.bench.execution.isolation.signals import EXPIRED, STOPS, bl
 WORKER = "gradient_routes.bench.execution.isolation.worker"
 
 
-class Line:
+class WorkerProcess:
     """A worker doing a job, and the messages it sends. A thread reads them: half a message must stop nobody.
 
     echo        what it writes to stderr appears on this process' stderr as well
