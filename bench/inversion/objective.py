@@ -123,9 +123,9 @@ class Objective:
     def _evaluate(self, x: Array) -> Evaluation:
         p = self.problem.parameters.check(self.variables.p(x), self.problem.name)
         with np.errstate(all="ignore"):
-            J, gradient, u, _, lam, _ = self._gradient(p)
-            J = self.model.value(p) if J is None else float(J)
-        g = np.asarray(gradient, dtype=np.float64)
+            found = self._gradient(p)
+            J = self.model.value(p) if found.J is None else float(found.J)
+        g = np.asarray(found.gradient, dtype=np.float64)
         if not (np.isfinite(J) and np.isfinite(g).all()):
             raise Overflow(f"{self.problem.name}: J = {J}, |dJ/dp| = {norm2(g)} at a step - choose another start")
-        return Evaluation(x.copy(), p, J, g * self.variables.slope(x), g, u=u, lam=lam)
+        return Evaluation(x.copy(), p, J, g * self.variables.slope(x), g, u=found.u, lam=found.lam)
