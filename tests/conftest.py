@@ -102,6 +102,12 @@ def relative_error(g: Array, reference: Array) -> float:
 
 
 @pytest.fixture(autouse=True)
+def piped_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables are as wide as in a pipe: test runners tell the width of their own terminal."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
+@pytest.fixture(autouse=True)
 def garbage_of_this_test_only() -> Iterator[None]:
     """Measurements collect garbage first: through all that JAX compiled for earlier tests that would take seconds."""
     gc.freeze()

@@ -20,10 +20,11 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]  # as click.optio
 
 @dataclass(frozen=True)
 class Kept:
-    """A row of one of the study's tables."""
+    """A row of one of the study's tables; of `cases`, which the study has stored itself, where `stored`."""
 
     table: str
     row: Row
+    stored: bool = False
 
 
 @dataclass(frozen=True)

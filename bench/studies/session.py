@@ -33,8 +33,9 @@ class Session:
 
     def hear(self, message: Message) -> None:
         match message:
-            case Kept(table, row):
-                self.tables[table].append(row)
+            case Kept(table, row, stored):
+                if not stored:
+                    self.tables[table].append(row)
                 if self.as_json and self.study.json is None:
                     self._print(as_json({"table": table, **row}) + "\n")
             case Note(text):

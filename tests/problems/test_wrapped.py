@@ -35,7 +35,7 @@ CHANGED = {
         "view",
         "truth",
     ),
-    *("twin", "observed", "weighted", "behind", "load_cases", "prior", "refined", "fields"),
+    *("twin", "observed", "weighted", "with_stop", "load_cases", "prior", "refined", "fields"),
 }
 
 

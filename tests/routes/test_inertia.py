@@ -10,7 +10,7 @@ from test_factorization import as_general
 
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, SymmetricSparse
-from gradient_routes.problems.matrices.tridiagonal import Bordered, Chain
+from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.solvers.factorization import Factorizer
@@ -41,12 +41,12 @@ def test_sparse_factors_count_negative_eigenvalues(linear_solver: str, quantile:
 @pytest.mark.parametrize(
     "A",
     [
-        Chain(np.array([1.0, 2.0, 3.0])),
-        Chain(np.array([1.0, 2.0, 3.0]), 5.0),
-        Chain(np.array([1.0, 2.0, 3.0]), -0.5),
-        Chain(np.array([1.0, 2.0, 3.0]), -0.6),
-        Bordered(np.array([1.0, 2.0]), 1.0, True),
-        Bordered(np.array([1.0, 2.0]), 2.0, False),
+        Tridiagonal(np.array([1.0, 2.0, 3.0])),
+        Tridiagonal(np.array([1.0, 2.0, 3.0]), 5.0),
+        Tridiagonal(np.array([1.0, 2.0, 3.0]), -0.5),
+        Tridiagonal(np.array([1.0, 2.0, 3.0]), -0.6),
+        BorderedTridiagonal(np.array([1.0, 2.0]), 1.0, True),
+        BorderedTridiagonal(np.array([1.0, 2.0]), 2.0, False),
         np.diag([1.0, -2.0, -3.0]) + 0.1,
         np.array([[0.0, 1.0, 2.0], [1.0, 0.0, 3.0], [2.0, 3.0, 0.0]]),  # pivots of 2 x 2
     ],
@@ -65,8 +65,8 @@ def test_chains_and_dense_matrices_count_theirs(A) -> None:
         (csr_array(np.eye(3)), "auto"),
         (SymmetricSparse(K.pattern, K.data + 0j), "pardiso"),
         (SymmetricSparse(K.pattern, K.data + 0j), "superlu"),
-        (Chain(np.ones(3) + 0j), "auto"),
-        (Bordered(np.ones(3) + 0j, 1.0, True), "auto"),
+        (Tridiagonal(np.ones(3) + 0j), "auto"),
+        (BorderedTridiagonal(np.ones(3) + 0j, 1.0, True), "auto"),
         (np.array([[1.0, 2.0], [0.0, 1.0]]), "auto"),
         (K, "krylov"),
         (K, "cg-amg"),

@@ -62,6 +62,8 @@ def run(
     done = scaling(asked, specs, settings, keeping(kept, lost), measure, race)
     tell(None)
     say(Result(done))
+    for row in done.rows:
+        say(Kept("cases", row, stored=True))
     for table, rows in done.tables.items():
         for row in rows:
             say(Kept(table, row))

@@ -27,7 +27,7 @@ from gradient_routes.bench.render.figure import Axis, Figure, Section, Table
 from gradient_routes.bench.render.marks import MARKS
 from gradient_routes.bench.render.picking import real
 from gradient_routes.bench.render.sections import sections
-from gradient_routes.bench.render.source import ASKED, Source, newest, read
+from gradient_routes.bench.render.source import Source, newest, read
 from gradient_routes.bench.render.style import CONTRAST, NIGHT, PAPER, bare, contrast, of_route
 from gradient_routes.bench.render.terminal.palette import ROUTES as COLOURS
 from gradient_routes.bench.render.vega import overlaps, records, spec, svg
@@ -334,7 +334,7 @@ def test_routes_are_told_apart_without_colour_and_keep_theirs(report: Report) ->
 
 def test_the_newest_study_of_each_thing_asked_is_shown() -> None:
     rows = [{"study_id": k, "problem": p, "route": "adjoint", "at": "start"} for k, p in ((1, "a"), (2, "b"), (3, "a"))]
-    assert [row["study_id"] for row in newest(rows, ASKED["checks"])] == [2, 3]
+    assert [row["study_id"] for row in newest(rows, study_tables()["checks"].question)] == [2, 3]
 
 
 def test_the_newest_run_of_a_case_is_shown(tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ def content(monkeypatch: pytest.MonkeyPatch, **changed: object) -> str:
     for name, value in changed.items():
         monkeypatch.setattr(keys, name, value)
     (problem,), (route,) = case.problems(["bar"]), case.routes(["adjoint"])
-    return keys.identified(kept(at="start"), problem, route, Settings(), 1)["content_key"]
+    return keys.identity(problem, route, Settings(), 1)["content_key"]
 
 
 def test_versions_of_libraries_and_of_the_harness_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:

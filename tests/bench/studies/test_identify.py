@@ -328,7 +328,7 @@ def test_fields_are_written_cell_by_cell(cli) -> None:
 
 
 WRONG = {
-    "--problem bar[sensors=0]": "no sensors, m = 0",
+    "--problem bar[sensors=0]": "no sensors, and m = 0",
     "--problem duffing/problem.py:Duffing": "has no observation S u",
     "--problem black.py:Black": "needs the partial derivatives",
     "--noise 0": "--noise 0",
