@@ -26,6 +26,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(
         "[gradient_routes.problems]\nsunk = sunk.problem:Sunk\n[gradient_routes.routes]\nnone = math:pi\n"
+        "[gradient_routes.studies]\ngone = gone:STUDY\n"
         "[gradient_routes.solvers]\nlost = lost.solver:lost\nnumber = math:pi\n"
     )
     return site
@@ -42,6 +43,8 @@ def test_plugins_are_listed_with_their_origin_and_the_broken_with_the_reason(sit
     assert "fd-extrapolated  (from gradient-routes-duffing)" in done.stdout
     assert "'sunk' of broken cannot be imported: ModuleNotFoundError: No module named 'sunk'" in done.stdout
     assert "'none' of broken is no Route" in done.stdout
+    assert "symmetry  (from gradient-routes-duffing)" in done.stdout
+    assert "study 'gone' of broken cannot be imported: ModuleNotFoundError: No module named 'gone'" in done.stdout
 
 
 def test_plugins_run_beside_the_built_ins(site: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.options import options_of
+from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Problem, offer_names
@@ -18,9 +19,9 @@ from gradient_routes.routes.route import Route
 INDENT = "  "
 
 
-def listing(kind: registry.Kind, width: int) -> Iterator[Text]:
-    """The lines about all problems or all routes."""
-    yield Text(f"{kind}s", style="bold")
+def listing(title: str, kind: registry.Kind, width: int) -> Iterator[Text]:
+    """The lines about all of a kind."""
+    yield Text(title, style="bold")
     for entry in registry.registered(kind):
         for text, style in _block(kind, entry, width - len(INDENT)):
             yield Text(INDENT + text, style=style)
@@ -36,7 +37,8 @@ def _block(kind: registry.Kind, entry: registry.Entry, width: int) -> Iterator[t
         return
     try:
         target = entry.load()
-        options = [(option.text, option.help) for option in options_of(registry.factory_of(target)).values()]
+        named = {} if kind == "study" else options_of(registry.factory_of(target))
+        options = [(option.text, option.help) for option in named.values()]
     except InputError as error:
         yield from ((line, "red") for line in wrap(str(error), width))
         return
@@ -59,12 +61,16 @@ def _described(options: list[tuple[str, str]], width: int) -> Iterator[str]:
 
 
 def _summary(target: Any) -> str:
+    if isinstance(target, Study):
+        return target.question
     if isinstance(target, Route):
         return target.summary
     return " ".join((target.__doc__ or "").strip().split("\n\n")[0].split())
 
 
 def _contract(kind: registry.Kind, target: Any) -> str:
+    if isinstance(target, Study):
+        return f"tables: {', '.join(target.tables) or 'cases'}; options: routes {target.name} --help"
     if isinstance(target, Route):
         return f"needs: {', '.join(offer_names(target.needs))}"
     if isinstance(target, type) and issubclass(target, Problem):

@@ -52,7 +52,7 @@ def test_sparse_factors_count_negative_eigenvalues(linear_solver: str, quantile:
     ],
 )
 def test_chains_and_dense_matrices_count_theirs(A) -> None:
-    n = A.shape[0] if isinstance(A, np.ndarray) else len(A.D) + isinstance(A, Bordered)
+    n = A.shape[0] if isinstance(A, np.ndarray) else len(A.D) + isinstance(A, BorderedTridiagonal)
     full = np.column_stack([A @ e for e in np.eye(n)])
     assert Factorizer()(A, "test").negative_eigenvalues == (np.linalg.eigvalsh(full) < 0.0).sum()
 
