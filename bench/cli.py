@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import click
 
-from gradient_routes.bench.cases import registry
 from gradient_routes.bench.commands.compare import baseline, compare
 from gradient_routes.bench.commands.completion import with_completion
 from gradient_routes.bench.commands.export import export
@@ -13,7 +12,7 @@ from gradient_routes.bench.commands.list import list_
 from gradient_routes.bench.commands.report import report
 from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
-from gradient_routes.bench.studies.command import command_of
+from gradient_routes.bench.studies.command import commands_of_studies
 
 OTHERS: list[click.Command] = [list_, status, report, export, compare, baseline]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
@@ -36,5 +35,5 @@ def main() -> None:
     """
 
 
-for command in (*map(command_of, registry.studies().values()), *OTHERS):
+for command in (*commands_of_studies(), *OTHERS):
     main.add_command(with_completion(command))

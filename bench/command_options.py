@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from gradient_routes.bench.sanitize import plain
+from gradient_routes.bench.sanitize import plain, unread
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.solvers.registry import DEFAULT, points
 
@@ -108,7 +108,10 @@ def checked(budget: float) -> float:
 
 def complain(what: str) -> None:
     """Print one line on stderr, without line breaks and control characters of names in it."""
-    click.echo(f"routes: {plain(' '.join(what.split()))}", err=True)
+    try:
+        click.echo(f"routes: {plain(' '.join(what.split()))}", err=True)
+    except OSError:  # nobody reads it
+        unread(sys.stderr)
 
 
 def debugging() -> bool:

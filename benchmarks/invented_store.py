@@ -38,8 +38,8 @@ def fill(store: Store, cases: int, studies: int = 1, seed: int = 0) -> None:
             made = {name: of for name, of in make(problem, 8 * (k + 1), rng).items() if name in study_tables()}
             if made:
                 whole = {name: [whole_row(name, row) for row in of] for name, of in made.items()}
-                store.append_study(whole, WHEN)
-    store.append_ended("tolerance", "timeout", "after 3600 s of --timeout", "its last words")
+                store.append_study(next(iter(whole)), whole, WHEN)
+    store.append_study("tolerance", {}, WHEN, "timeout", "after 3600 s of --timeout", "its last words")
 
 
 def whole_row(table: str, row: Row) -> Row:

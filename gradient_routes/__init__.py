@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from gradient_routes.bench.cases.study import Found as Found
     from gradient_routes.bench.cases.study import Kept as Kept
     from gradient_routes.bench.cases.study import Note as Note
+    from gradient_routes.bench.cases.study import Rule as Rule
     from gradient_routes.bench.cases.study import Say as Say
     from gradient_routes.bench.cases.study import Study as Study
     from gradient_routes.bench.command_options import at_option as at_option
@@ -96,6 +97,7 @@ PUBLIC = {  # name -> the module that defines it, imported when the name is firs
     "Problem": "gradient_routes.problems.problem",
     "Result": "gradient_routes.routes.route",
     "Route": "gradient_routes.routes.route",
+    "Rule": "gradient_routes.bench.cases.study",
     "RoutesError": "gradient_routes.problems.errors",
     "Say": "gradient_routes.bench.cases.study",
     "Store": "gradient_routes.bench.store.store",

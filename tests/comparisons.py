@@ -45,5 +45,5 @@ def stored(path: Path, *rows, seconds=(), verdict: str | None = "agrees") -> Pat
         store.append(one, Samples(tuple(seconds), (0.5,) * len(seconds)) if seconds else None)
     if verdict is not None:
         check = dict.fromkeys(c.name for c in CHECKS) | {"problem": "bar", "route": "adjoint", "at": "start"}
-        store.append_study({"checks": [check | {"verdict": verdict}]}, "now")
+        store.append_study("check", {"checks": [check | {"verdict": verdict}]}, "now")
     return path

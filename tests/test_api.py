@@ -137,7 +137,7 @@ def test_the_store_gives_frames(tmp_path: Path) -> None:
     cases = store.cases()
     assert list(cases["gradient_error"]) == list(frame["gradient_error"])
     assert str(cases["n_param"].dtype) == "Int64"
-    store.append_study({"tolerance": []}, "2026-01-01T00:00:00Z")
+    store.append_study("tolerance", {"tolerance": []}, "2026-01-01T00:00:00Z")
     assert list(store.studies()["study"]) == ["tolerance"]
     assert store.studies("tolerance").empty
     assert "reference" in Store(ROOT / "results" / "reference.sqlite").cases().columns

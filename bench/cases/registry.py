@@ -64,8 +64,10 @@ class Entry:
             raise InputError(f"route '{self.name}' of {self.origin} calls itself '{target.name}' - give it one name")
         if self.kind == "problem" and not callable(target):
             raise InputError(f"problem '{self.name}' of {self.origin} cannot be called - register a class or a factory")
-        if self.kind == "study" and not (isinstance(target, Study) and target.name == self.name):
-            raise InputError(f"study '{self.name}' of {self.origin} is no Study of that name - register one")
+        if self.kind == "study":
+            if not (isinstance(target, Study) and target.name == self.name):
+                raise InputError(f"study '{self.name}' of {self.origin} is no Study of that name - register one")
+            target.check(self.origin)
         return target
 
     @property

@@ -1,4 +1,4 @@
-"""READ FIRST in bench. A study: one question answered by measurement, declared as one value.
+"""READ FIRST. A study: one question answered by measurement, declared as one value.
 
 Its command, the tables of the store, the columns of CSV files, the sections of a report and the reference pages of the
 documentation are all made from that value. A study is registered by an entry point of the group
@@ -13,8 +13,10 @@ from importlib import import_module
 from typing import Any
 
 from gradient_routes.bench.cases.column import Row, Table
+from gradient_routes.problems.errors import InputError
 
 Options = dict[str, Any]
+RESERVED = ("cases", "samples", "environments", "studies", "study_id")  # tables and the key of every store
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]  # as click.option(...) gives one
 
 
@@ -62,15 +64,17 @@ class Study:
     question  what it answers, in one sentence
     help      the rest of `--help`
     options   click options, in the order of `--help`; those of the store, of limits, --json and --no-plot are added
-    rules     options that go with others only
+    rules     options that are refused unless another one is given
     tables    what it keeps; the name of the first one stands in the table `studies`
     run       (say: Say, **options) -> exit code or None: measures, and says what it finds as soon as it is found. It
-              may catch KeyboardInterrupt to say what it has; it then raises it again
+              may catch KeyboardInterrupt to say what it has; it then raises it again. Rows first: a view may fail
     view      (console, value, plots: bool) -> None: shows the value of a Found in a terminal
     json      (value) -> dict: --json prints it for every Found; without, every kept row is a line
     figures   (source) -> Section | None: its part of a report
     command   "module:command", a click command of its own in place of the one that is made
+    stores    whether there will be rows to store, by the options; without, always
     keeps     whether an interrupted run has something to keep
+    plots     whether --no-plot is one of its options
     confined  whether the whole study runs in a process of its own under limits; else `run` gets `isolate` and `limits`
     """
 
@@ -85,9 +89,19 @@ class Study:
     json: str | None = None
     figures: str | None = None
     command: str | None = None
+    stores: Callable[[Options], bool] | None = None
     keeps: bool = False
     confined: bool = True
     plots: bool = True
+
+    def check(self, origin: str) -> None:
+        """Raises InputError for names of tables and columns that a store cannot have."""
+        names = [*self.tables, *(column.name for table in self.tables.values() for column in table.columns)]
+        odd = [name for name in names if not name.isidentifier() or name in RESERVED]
+        if odd:
+            raise InputError(
+                f"study '{self.name}' of {origin}: a table or column cannot be named '{odd[0]}' - choose another name"
+            )
 
     def load(self, part: str) -> Callable[..., Any] | None:
         """The function behind `run`, `view`, `json`, `figures` or `command`; None where the study has none."""

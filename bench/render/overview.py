@@ -85,7 +85,7 @@ def failures(source: Source) -> Section | None:
     if ended:
         says = f"{len(ended)} ended before they were done."
         table = tabulate("studies", ended, "study status reason started")
-        figures.append(Figure("ended", "Studies without a result", says, table))
+        figures.append(Figure("ended", "Studies that ended early", says, table))
     notes = tuple(_note(row) for row in rows if row["stderr"] or row["traceback"])
     notes += tuple(_ended(row) for row in ended if row["stderr"])
     says = "Nothing is dropped: skipped and pruned by rule, stopped by a limit, or wrong."

@@ -11,10 +11,10 @@ from gradient_routes.bench.cases.row import ENVIRONMENTS, KEYS, SAMPLES, STORED
 KEY = Column("study_id", "INTEGER", "", "of the row in studies")
 STUDY = (
     Column("study_id", "INTEGER PRIMARY KEY", "", "counts the studies of this store"),
-    Column("study", "TEXT", "", "name of the table that holds its rows"),
+    Column("study", "TEXT", "", "its name: the command"),
     Column("environment_id", "TEXT", "", "of the row in environments"),
     Column("started", "TEXT", "UTC", "when it began, ISO 8601"),
-    Column("status", "TEXT", "", "ok, or what ended it before it was done: timeout, out-of-memory, crashed"),
+    Column("status", "TEXT", "", "ok, or how it ended before it was done: timeout, interrupted, failed ..."),
     Column("reason", "TEXT", "", "why it is not ok"),
     Column("stderr", "TEXT", "", "the last lines on stderr of one that is not ok"),
 )

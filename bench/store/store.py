@@ -22,7 +22,6 @@ from gradient_routes.bench.cases.row import ENVIRONMENTS, STORED, as_record, fro
 from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.bench.store.schema import KEY, tables
-from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -82,34 +81,35 @@ class Store:
                     timings = [(case_id, kind, i, s) for kind, seconds in kinds for i, s in enumerate(seconds)]
                     db.executemany("INSERT INTO samples VALUES (?, ?, ?, ?)", timings)
 
-    def append_study(self, found: Mapping[str, Sequence[Row]], started: str) -> int:
-        """Keep the rows of one study, by table, all or nothing; the first table names it. Returns its study_id."""
+    def append_study(
+        self,
+        study: str,
+        found: Mapping[str, Sequence[Row]],
+        started: str,
+        status: str = "ok",
+        reason: str | None = None,
+        stderr: str | None = None,
+    ) -> int:
+        """Keep the rows of one study, by table, and how it ended, all or nothing. Returns its study_id."""
         with self._transaction() as db:
-            values = (next(iter(found)), self._environment_id(db), started, "ok")
-            names = "study, environment_id, started, status"
-            cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?)", values)
+            values = (study, self._environment_id(db), started, status, reason, stderr)
+            names = "study, environment_id, started, status, reason, stderr"
+            cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
             study_id = int(cursor.lastrowid or 0)
             for name, rows in found.items():
                 columns = tables()[name][1:]
                 marks = ", ".join("?" * (1 + len(columns)))
-                names = ", ".join(c.name for c in (KEY, *columns))
+                names = ", ".join(f'"{c.name}"' for c in (KEY, *columns))
                 records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in rows]
-                db.executemany(f"INSERT INTO {name} ({names}) VALUES ({marks})", records)
+                db.executemany(f'INSERT INTO "{name}" ({names}) VALUES ({marks})', records)
             return study_id
-
-    def append_ended(self, study: str, status: str, reason: str, stderr: str) -> None:
-        """Keep that a study was ended before it was done."""
-        with self._transaction() as db:
-            values = (study, self._environment_id(db), now(), status, reason, stderr)
-            names = "study, environment_id, started, status, reason, stderr"
-            db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
 
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Column names and rows of a table, oldest first. Raises InputError where there is no store."""
         with self._reading() as db:
             if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
                 return [c.name for c in tables()[name]], []  # a store of an older schema
-            cursor = db.execute(f"SELECT * FROM {name} ORDER BY rowid")
+            cursor = db.execute(f'SELECT * FROM "{name}" ORDER BY rowid')
             return [d[0] for d in cursor.description], cursor.fetchall()
 
     def records(self, name: str) -> list[Row]:
@@ -223,10 +223,11 @@ class Store:
             there.setdefault(table, set()).add(column)
         for name, columns in tables().items():
             if name not in there:
-                db.execute(f"CREATE TABLE {name} ({', '.join(f'{c.name} {c.type}' for c in columns)})")
+                declared = ", ".join(f'"{c.name}" {c.type}' for c in columns)
+                db.execute(f'CREATE TABLE "{name}" ({declared})')
             for column in columns if name in there else ():
                 if column.name not in there[name]:
-                    db.execute(f"ALTER TABLE {name} ADD COLUMN {column.name} {column.type}")
+                    db.execute(f'ALTER TABLE "{name}" ADD COLUMN "{column.name}" {column.type}')
         db.execute("CREATE INDEX IF NOT EXISTS by_case ON cases (case_key)")
         if db.execute("PRAGMA user_version").fetchone()[0] != SCHEMA:
             db.execute(f"PRAGMA user_version = {SCHEMA}")

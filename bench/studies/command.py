@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Iterator
 from functools import partial
 from inspect import cleandoc
 from pathlib import Path
@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.status import one_line
 from gradient_routes.bench.cases.study import Study
-from gradient_routes.bench.command_options import debug_option, refuse_given, store_options
+from gradient_routes.bench.command_options import complain, debug_option, refuse_given, store_options
 from gradient_routes.bench.execution.options import limit_options
 
 if TYPE_CHECKING:
@@ -24,6 +26,15 @@ json_option = click.option("--json", "as_json", is_flag=True, help="One JSON obj
 one_json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
 
 
+def commands_of_studies() -> Iterator[click.Command]:
+    """Those of all registered studies; a plug-in whose command cannot be made is left out, and that is said."""
+    for study in registry.studies().values():
+        try:
+            yield command_of(study)
+        except Exception as error:
+            complain(f"study '{study.name}' is left out: {one_line(error)} - correct its declaration")
+
+
 def command_of(study: Study) -> click.Command:
     """The click command `routes NAME`."""
     own = study.load("command")
@@ -34,7 +45,7 @@ def command_of(study: Study) -> click.Command:
         *((no_plot_option,) if study.plots else ()),
         json_option if study.json is None else one_json_option,
         store_options,
-        *((limit_options("it", 3600.0, LAST if study.keeps else 0.0),) if study.confined else ()),
+        limit_options("it", 3600.0, LAST if study.keeps else 0.0) if study.confined else limit_options("a case", 600.0),
         debug_option,
     ]
     callback: Any = partial(_call, study)
@@ -64,8 +75,8 @@ def _call(
             refuse_given(rule.names, rule.why)
     if not study.confined:  # it runs cases that are
         given |= {"isolate": isolate, "limits": limits}
-    job = RunStudy(study.name, given | {"kept": kept}, Screen.of(sys.stdout), as_json, not no_plot)
-    session = Session(study, kept, as_json)
+    job = RunStudy(study.name, given | {"kept": kept}, Screen.of_stdout(), as_json, not no_plot)
+    session = Session(study, kept if study.stores is None or study.stores(given) else None, as_json)
     interruptible()  # SIGTERM acts like Ctrl-C
     if study.confined and isolate:
         for message in stream(job, limits, last_words=LAST if study.keeps else 0.0):

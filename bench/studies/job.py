@@ -9,10 +9,11 @@ from typing import IO, cast
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.row import clean
-from gradient_routes.bench.cases.study import Found, Message, Options
+from gradient_routes.bench.cases.study import Found, Kept, Message, Options, Study
 from gradient_routes.bench.execution.isolation.channel import Channel
-from gradient_routes.bench.render.terminal.tables import PIPED_WIDTH
+from gradient_routes.bench.render.terminal.tables import console
 from gradient_routes.bench.render.terminal.terminal import Terminal
+from gradient_routes.problems.errors import RoutesError
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,9 @@ class Screen:
     colors: str | None
 
     @classmethod
-    def of(cls, stream: IO[str]) -> Screen:
-        here = Terminal(file=stream)
-        return cls(here.is_terminal, here.width if here.is_terminal else PIPED_WIDTH, here.color_system)
+    def of_stdout(cls) -> Screen:
+        here = console()
+        return cls(here.is_terminal, here.width, here.color_system)
 
     def console(self, say: Callable[[Printed], None]) -> Terminal:
         """A console whose text is heard as Printed."""
@@ -87,6 +88,8 @@ class RunStudy:
         out = self.screen.console(channel.say)
 
         def say(message: Message) -> None:
+            if isinstance(message, Kept) and not message.stored:
+                _check(study, message)
             if not isinstance(message, Found):
                 channel.say(message)
             elif self.as_json:
@@ -95,4 +98,16 @@ class RunStudy:
             elif view is not None:
                 view(out, message.value, self.plots)
 
-        channel.say(ExitCode(run(say, **self.options) or 0))
+        code = run(say, **self.options) or 0
+        if not (isinstance(code, int) and 0 <= code < 256):
+            raise RoutesError(f"{self.name}: returned {code!r} - return an exit code or None")
+        channel.say(ExitCode(code))
+
+
+def _check(study: Study, kept: Kept) -> None:
+    """Raise RoutesError for a row that is not of a declared table."""
+    table = study.tables.get(kept.table)
+    if table is None or {column.name for column in table.columns} != set(kept.row):
+        raise RoutesError(
+            f"{study.name}: a row of '{kept.table}' has not the columns that are declared - correct its Kept"
+        )

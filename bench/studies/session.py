@@ -13,11 +13,13 @@ from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.cases.study import Kept, Note, Study
 from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
-from gradient_routes.bench.sanitize import unread
+from gradient_routes.bench.sanitize import plain, unread
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.job import ExitCode, Printed
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
+
+LOST = 2  # exit code where what was found could not be written
 
 
 class Session:
@@ -27,7 +29,7 @@ class Session:
         self.study, self.as_json, self.started = study, as_json, now()
         self.store = None if kept is None else Store(kept)
         self.tables: dict[str, list[Row]] = {name: [] for name in study.tables}
-        self.code, self.end = 0, Ended(Status.CRASHED)
+        self.code, self.end, self.lost = 0, Ended(Status.CRASHED), ""
         if self.store is not None:
             self.store.check_writable()
 
@@ -48,31 +50,34 @@ class Session:
                 self.end = message
 
     def close(self) -> int:
-        """Keep the rows, say how it ended if not well; the exit code. Raises InputError where rows are lost."""
-        end = self.end
-        if self.store is not None and any(self.tables.values()):
+        """Keep the rows and how the study ended, say so where it did not end well; the exit code."""
+        end, rows = self.end, any(self.tables.values())
+        well = end.status is Status.OK
+        if self.store is not None and (rows or end.status.todo):  # `todo`: it was ended, or lost
+            how = () if well else (end.status, end.reason, end.stderr)
             try:
-                self.store.append_study(self.tables, self.started)
+                self.store.append_study(self.study.name, self.tables, self.started, *how)
             except InputError as error:
-                raise InputError(f"not kept: {error}") from error
-            if not self.as_json:
-                self._print(click.style(f"kept in {self.store.path}", dim=True) + "\n")
-        elif self.store is not None and end.status.todo:  # ended by a limit, or lost
-            self.store.append_ended(self.study.name, end.status, end.reason, end.stderr)
-        if end.status is Status.OK:
-            return self.code
-        if debugging():
-            click.echo(end.traceback, err=True, nl=False)
-        finished = FINISHED if self.study.keeps and not end.killed else None
+                self.lost = f"not kept: {error}"
+            else:
+                if rows and not self.as_json:
+                    self._print(click.style(plain(f"kept in {self.store.path}"), dim=True) + "\n")
+        if debugging() and end.traceback:
+            click.echo(plain(end.traceback), err=True, nl=False)
+        finished = FINISHED if not self.lost and (rows or (self.study.keeps and not end.killed)) else None
         if end.status is Status.INTERRUPTED:
             complain(f"interrupted - {finished or 'nothing is kept'}")
-        else:
+        elif not well:
             complain(end.line(self.study.name) + (f"; {finished}" if finished and end.status is Status.TIMEOUT else ""))
-        return end.status.exit_code
+        if self.lost:
+            complain(self.lost)
+        return (LOST if self.lost else self.code) if well else end.status.exit_code
 
     def _print(self, text: str) -> None:
-        """A reader who has gone ends nothing."""
+        """A reader who has gone ends nothing; nor does a full disk, which is said in the end."""
         try:
             click.echo(text, nl=False)
-        except BrokenPipeError:
+        except OSError as error:
             unread(sys.stdout)
+            if not isinstance(error, BrokenPipeError):
+                self.lost = f"stdout: {error.strerror} - check where the output goes"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from gradient_routes.bench.cases.status import FOREIGN, Status, one_line, reason_of, status_of
+from gradient_routes.bench.cases.status import Status, one_line, reason_of, status_of
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Order, Returned
 from gradient_routes.problems.errors import DomainError, InputError
 
@@ -62,7 +62,7 @@ def ended(job: Job, channel: Channel) -> Ended:
         return Ended(Status.INTERRUPTED)
     except (InputError, DomainError) as error:
         return Ended(Status.REFUSED, str(error), traceback=_formatted(error))
-    except FOREIGN as failure:
+    except BaseException as failure:  # whatever code of others raises
         status = status_of(failure)
         reason = one_line(failure) if status.todo else reason_of(failure, job.name)
         return Ended(status, reason, traceback=_formatted(failure))

@@ -83,7 +83,7 @@ class Ended:
         return f"{who}: {self.status}: {self.reason} - {self.status.todo}" if self.status.todo else self.reason
 
 
-Message = Any  # one of these, or of bench.cases.study, or whatever else a job and its listener agree on
+Message = Any  # one of these, or of bench.cases.study, or any other picklable value
 
 
 @dataclass(frozen=True)

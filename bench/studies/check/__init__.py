@@ -59,6 +59,7 @@ STUDY = Study(
         Rule(("budget", "accept", "seed", "html", "no_plot", "store"), _judged, "is for verdicts, a contract has none"),
     ),
     tables=TABLES,
+    stores=_judged,
     run="gradient_routes.bench.studies.check.measure:run",
     view="gradient_routes.bench.studies.check.view:show",
     json="gradient_routes.bench.studies.check.view:as_dict",

@@ -23,18 +23,20 @@ def page_writable(html: Path | None, taken: Iterable[Path | str | None]) -> None
 
 def conclude(say: Say, check: Check, what: Row, html: Path | None) -> int:
     """Write the page, say the verdict and its rows; the exit code."""
-    lost = html is not None and not _write_page(say, check, html)
-    say(Found(check))
     for table, of in rows(check, what).items():
         for row in of:
             say(Kept(table, row))
-    return LOST if lost else check.exit_code
+    said = None if html is None else _write_page(check, html)
+    say(Found(check))
+    if said is not None:
+        say(Note(said[0]))
+    return LOST if said is not None and said[1] else check.exit_code
 
 
-def _write_page(say: Say, check: Check, html: Path) -> bool:
+def _write_page(check: Check, html: Path) -> tuple[str, bool]:
+    """What to say of it, and whether it is lost."""
     try:
         html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        say(Note(f"--html {html}: {error.strerror or error} - name a file you may write"))
-        return False
-    return True
+        return f"--html {html}: {error.strerror or error} - name a file you may write", True
+    return f"page in {html}", False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.cases.study import Found, Kept, Say
+from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.store.output_files import check_writable
 from gradient_routes.bench.studies.bill import vtu as file
 from gradient_routes.bench.studies.identify.identifiability import Identified, identify, varied
@@ -26,7 +26,6 @@ class Determined:
     experiments: Sequence[Identified]
     placement: Placement | None
     tables: dict[str, list[Row]]
-    file: Path | None  # that holds fields
 
 
 def run(
@@ -56,12 +55,16 @@ def run(
     placement = None if place is None else placed(found[0], place, criterion, afresh)
     mesh = None if vtu is None else fields(found[0])
     tables = rows(found, placement)
-    if vtu is not None and mesh is not None:
-        file.write(vtu, mesh)
-    say(Found(Determined(found, placement, tables, vtu if mesh is not None else None)))
     for name, of in tables.items():
         for row in of:
             say(Kept(name, row))
+    say(Found(Determined(found, placement, tables)))
+    if vtu is not None and mesh is not None:
+        try:
+            file.write(vtu, mesh)
+        except OSError as error:
+            raise InputError(f"--vtu {vtu}: {error.strerror or error} - name a file you may write") from error
+        say(Note(f"fields in {vtu}"))
 
 
 def _change(text: str) -> tuple[str, str]:

@@ -50,8 +50,6 @@ def show(out: Console, done: Determined, plotted: bool = True) -> None:
         tables.show(out, proposal(placement, rows["placement"]))
         for note in placement.notes:
             out.print(Text(note, style="dim"), soft_wrap=wrap)
-    if done.file is not None:
-        out.print(f"fields in {done.file}", style="dim", soft_wrap=True)
 
 
 def spectra(found: Sequence[Identified], width: int) -> Text:

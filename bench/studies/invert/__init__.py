@@ -44,7 +44,7 @@ STUDY = Study(
         click.option("--tolerance", type=float, default=1e-8, show_default=True, help=TOLERANCE),
         click.option(
             "--positive",
-            type=click.Choice(["none", "log", "softplus"]),
+            type=click.Choice(POSITIVES),
             default="none",
             show_default=True,
             help=POSITIVE,

@@ -112,10 +112,10 @@ class Run:
             starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
         one_shot = self._one_shot(problem)
         done = self._until_it_ends(self._inversions(problem, starts, minibatch, seed, one_shot))
-        self.say(Found(Compared(done)))
         for table in ("inversion", "estimates"):
             for found in done:
                 self._keep(table, found.tables[table])
+        self.say(Found(Compared(done)))
 
     def _inversions(
         self, problem: Problem, starts: Sequence[Start], minibatch: int | None, seed: int, one_shot: float | None
@@ -158,16 +158,16 @@ class Run:
             )
         if draws is not None:
             trades = self._until_it_ends(trade_off(self.spec, route, self.engine, alphas, draws, self.at))
-            self.say(Found(Trades(trades)))
             self._keep("tradeoff", [trade.row for trade in trades])
+            self.say(Found(Trades(trades)))
             return
         points = l_curve(self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at))))
         best = next((point for point in points if point.chosen), points[-1]).inversion
         self._warn(best)
-        self.say(Found(LCurve(points, best)))
         self._keep("lcurve", [point.row for point in points])
         for table, rows in best.tables.items():
             self._keep(table, rows)
+        self.say(Found(LCurve(points, best)))
 
     def _swept(self, every: Iterable[Inversion]) -> Iterator[Inversion]:
         for found in every:

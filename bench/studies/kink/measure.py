@@ -66,9 +66,9 @@ def run(
             traded = _traded(swept, specs if routes else case.routes(["adjoint"]), budget)
         except RoutesError as unsolved:
             failure = unsolved
-    say(Found((selector, swept, traded)))
     for row in rows(swept, traded, {"problem": selector, "at": at}):
         say(Kept("kink", row))
+    say(Found((selector, swept, traded)))
     if swept.rounded and not swept.failed and traded is None and failure is None:
         say(Note("kink: the cost of the width is left out: no route runs for it - name another with --route"))
     if failure is not None:

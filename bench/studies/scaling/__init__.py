@@ -7,7 +7,6 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
-from gradient_routes.bench.execution.options import limit_options
 from gradient_routes.bench.studies.scaling.columns import BREAK_EVEN, SCALING_FITS
 
 PROBLEM = "NAME, whose n grows, or a grid of sizes: 'NAME[n=8|64|512]'."
@@ -35,7 +34,6 @@ STUDY = Study(
         click.option("--budget", type=float, default=10.0, show_default=True, help=BUDGET),
         click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time."),
         solver_options,
-        limit_options("a case", 600.0),
     ),
     tables={
         "scaling_fits": Table(SCALING_FITS, (*QUESTION, "quantity", "against")),

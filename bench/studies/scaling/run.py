@@ -22,6 +22,7 @@ from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.sweep import How
 from gradient_routes.bench.execution.sweep import run as run_cases
 from gradient_routes.bench.render.terminal.tables import titled
+from gradient_routes.bench.sanitize import plain
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.options import routes_of
 from gradient_routes.bench.studies.scaling.break_even import Found, Racing, break_even
@@ -55,18 +56,16 @@ def run(
     specs = routes_of(routes, say)
     settings = Settings(at, checked(budget), min_time, solver=solver)
     lost: list[str] = []
-    if not isolate:
-        limits.pin()
     measure = partial(run_cases, how=How(isolate, limits))
     race = partial(apart, break_even, limits) if isolate else break_even
     done = scaling(asked, specs, settings, keeping(kept, lost), measure, race)
     tell(None)
-    say(Result(done))
     for row in done.rows:
         say(Kept("cases", row, stored=True))
     for table, rows in done.tables.items():
         for row in rows:
             say(Kept(table, row))
+    say(Result(done))
     if lost:
         raise InputError(f"{len(lost)} of {len(done.rows)} cases were not kept: {lost[0]}")
     if done.interrupted:
@@ -96,7 +95,7 @@ def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels:
 
 def tell(row: Row | None) -> None:
     """What was measured last, on a line of the terminal that the next one covers; a bar that moves would be timed."""
-    if sys.stderr.isatty() and sys.stdout.isatty():
+    if sys.stderr.isatty():
         said = "" if row is None else f"{titled(row)} {row['route']}: {row['status']}"
         click.echo(f"\r\x1b[K{said[:70]}", nl=False, err=True)
 
@@ -112,7 +111,7 @@ def keeping(kept: Path | None, lost: list[str]) -> Callable[[Outcome], None]:
         except InputError as error:  # a full disk, a lock: the row is printed all the same
             lost.append(str(error))
         if debugging():
-            click.echo(outcome.row["traceback"] or "", err=True, nl=False)
+            click.echo(plain(outcome.row["traceback"] or ""), err=True, nl=False)
         tell(outcome.row)
 
     return append

@@ -129,9 +129,9 @@ def run(
     problem, specs = one_problem(selector), routes_of(routes, say)
     tolerances = sweep_of(decades(loosest, tightest, per_decade), sweep, rtol, adjoint_rtol)
     done = tolerance(problem, specs, tolerances, at, linear_solver, checked(budget))
-    say(Found(done))
     for row in done.rows:
         say(Kept("tolerance", row))
+    say(Found(done))
     if done.interrupted:
         raise KeyboardInterrupt
 

@@ -113,10 +113,10 @@ def run(
     kept: Path | None = None,
 ) -> None:
     done = unrolling(one_problem(selector), at, inner, checkpoint, max_iterations, within, checked(budget))
-    say(Found(done))
     for table, rows in done.tables.items():
         for row in rows:
             say(Kept(table, row))
+    say(Found(done))
 
 
 def unrolling(

@@ -163,7 +163,7 @@ def test_any_single_value_of_a_baseline_may_be_wrong_without_a_traceback(cli, tm
 
 
 def test_a_store_without_rows_and_one_of_another_program_are_refused(cli, tmp_path: Path, base: Path) -> None:
-    Store(tmp_path / "bare.sqlite").append_ended("check", "timeout", "after 1 s", "")
+    Store(tmp_path / "bare.sqlite").append_study("check", {}, "now", "timeout", "after 1 s", "")
     with closing(sqlite3.connect(tmp_path / "other.sqlite")) as db:
         db.execute("CREATE TABLE t (x)")
     for name, said in (("bare.sqlite", "holds no case and no verdict"), ("other.sqlite", "of another program")):

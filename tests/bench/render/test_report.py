@@ -114,7 +114,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
     fill(store, cases=90, studies=1)
     store.append(hostile(), None)
     for name in ("checks", "inversion", "placement", "estimates"):
-        store.append_study({name: [whole_row(name, hostile_study())]}, WHEN)
+        store.append_study(name, {name: [whole_row(name, hostile_study())]}, WHEN)
     source = read(store)
     made = sections(source)
     return Report(source, made, html.report(source, made))

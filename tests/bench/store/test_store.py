@@ -86,7 +86,7 @@ def test_a_study_installed_later_gets_its_tables_and_columns(tmp_path: Path, mon
     for columns in ((x,), (x, y)):
         new = known | {"installed": (KEY, *columns)}
         monkeypatch.setattr("gradient_routes.bench.store.store.tables", lambda new=new: new)
-        store.append_study({"installed": [{"x": 1.0, "y": {"z": 2}}]}, "today")
+        store.append_study("installed", {"installed": [{"x": 1.0, "y": {"z": 2}}]}, "today")
     assert [(r["x"], r["y"]) for r in store.records("installed")] == [(1.0, None), (1.0, {"z": 2})]
     assert store.rows() == [row()]
 
