@@ -31,9 +31,12 @@ class Kept:
 
 @dataclass(frozen=True)
 class Note:
-    """A line for stderr: what was left out, what is to be read beside the numbers."""
+    """A line for stderr: what was left out, what is to be read beside the numbers. On stdout where it tells of a
+    `result`, a file that was written say, and stdout is not for JSON.
+    """
 
     text: str
+    result: bool = False
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def _block(kind: registry.Kind, entry: registry.Entry, width: int) -> Iterator[t
         yield from ((line, "red") for line in wrap(str(error), width))
         return
     yield from ((line, "") for line in wrap(_summary(target), width))
-    yield _contract(kind, target), "dim"
+    yield from ((line, "dim") for line in wrap(_contract(kind, target), width))
     yield from ((line, "") for line in _described(options, width))
 
 

@@ -40,8 +40,11 @@ class Session:
                     self.tables[table].append(row)
                 if self.as_json and self.study.json is None:
                     self._print(as_json({"table": table, **row}) + "\n")
-            case Note(text):
-                complain(text)
+            case Note(text, result):
+                if result and not self.as_json:
+                    self._print(plain(text) + "\n")
+                else:
+                    complain(text)
             case Printed(text):
                 self._print(text)
             case ExitCode(code):

@@ -26,17 +26,17 @@ def conclude(say: Say, check: Check, what: Row, html: Path | None) -> int:
     for table, of in rows(check, what).items():
         for row in of:
             say(Kept(table, row))
-    said = None if html is None else _write_page(check, html)
+    written = None if html is None else _written(check, html)
     say(Found(check))
-    if said is not None:
-        say(Note(said[0]))
-    return LOST if said is not None and said[1] else check.exit_code
+    if written is not None:
+        say(written)
+    return check.exit_code if written is None or written.result else LOST
 
 
-def _write_page(check: Check, html: Path) -> tuple[str, bool]:
-    """What to say of it, and whether it is lost."""
+def _written(check: Check, html: Path) -> Note:
+    """What to say of the page: a result, or why it is lost."""
     try:
         html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        return f"--html {html}: {error.strerror or error} - name a file you may write", True
-    return f"page in {html}", False
+        return Note(f"--html {html}: {error.strerror or error} - name a file you may write")
+    return Note(f"page in {html}", result=True)

@@ -64,7 +64,7 @@ def run(
             file.write(vtu, mesh)
         except OSError as error:
             raise InputError(f"--vtu {vtu}: {error.strerror or error} - name a file you may write") from error
-        say(Note(f"fields in {vtu}"))
+        say(Note(f"fields in {vtu}", result=True))
 
 
 def _change(text: str) -> tuple[str, str]:

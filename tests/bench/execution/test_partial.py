@@ -13,7 +13,7 @@ from test_routes import ACCURACY, ZOO, differentiate, ids, pairs, reference, wit
 from gradient_routes.bench.cases.case import Case, ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.partial import Partial
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.execution import references as accuracy
+from gradient_routes.bench.execution import references
 from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.executors.in_process import InProcess
 from gradient_routes.bench.execution.executors.running import alone
@@ -196,7 +196,7 @@ def test_one_wrong_component_of_500_is_seen(route: Route, wrong: float, componen
 @pytest.mark.parametrize("name", ["duffing", "block[n=2]", "block[follower]"])
 @pytest.mark.parametrize("route", [adjoint, complex_step], ids=ids)
 def test_slopes_are_those_of_the_gradient(name: str, route: Route, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accuracy, "MANY", 0)
+    monkeypatch.setattr(references, "WHOLE", 0)
     problem = ZOO[name]
     p = somewhere(problem)
     judge = judged(problem, route, p)
@@ -220,7 +220,7 @@ class WrongRp(Duffing):
 
 @pytest.mark.parametrize("problem", [WrongTangent(), WrongRp()], ids=["R_u", "R_p"])
 def test_wrong_partial_derivatives_do_not_judge_themselves(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accuracy, "MANY", 0)
+    monkeypatch.setattr(references, "WHOLE", 0)
     p = problem.parameters.start
     judge = judged(problem, adjoint)
     assert isinstance(judge, Judge)

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from gradient_routes.bench.cases.case import problems
-from gradient_routes.bench.execution import references as accuracy
+from gradient_routes.bench.execution import references
 from gradient_routes.bench.store.store import SCHEMA, Store
 from gradient_routes.bench.studies.bill.files import Files
 from gradient_routes.problems.bar import Bar
@@ -49,7 +49,7 @@ def test_gradients_are_written_parameter_by_parameter(cli) -> None:
 
 
 def test_columns_are_empty_where_nothing_is_known(cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accuracy, "MANY", 0)
+    monkeypatch.setattr(references, "WHOLE", 0)
     assert cli(*RUN, "block[n=2]", "--route", "adjoint", "--gradient", "g.csv").code == 0
     assert pd.read_csv("g.csv").reference.isna().all(), "a judge in random directions knows no component"
     assert cli(*RUN, "bar", "--route", "adjoint", "--directions", "2", "--gradient", "g.csv").code == 0
