@@ -35,4 +35,4 @@ def outcomes(jobs: Iterator[Measure], slots: int, limits: Limits) -> Iterator[Ou
         finally:
             with Interrupt():  # impatience would leave processes that the threads wait for
                 for case in running.values():
-                    case.close()
+                    case.kill()  # the thread that listens to it closes it
