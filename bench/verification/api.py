@@ -23,7 +23,7 @@ def check(
     names: Sequence[str] | None = None,
     tighten: Callable[[float], Any] | None = None,
     active_set: Callable[..., Any] | None = None,
-    budget: float = 200,
+    budget: float = 240,
     seed: int = 0,
     accept: float = 0.0,
     name: str | None = None,

@@ -12,11 +12,16 @@ from gradient_routes.bench.verification import messages
 from gradient_routes.bench.verification.diagnosis import diagnose
 from gradient_routes.bench.verification.examine import Examination
 from gradient_routes.bench.verification.guarded import Account, Guarded, Unusable
+from gradient_routes.bench.verification.lines import directions
 from gradient_routes.bench.verification.plan import Plan
 from gradient_routes.bench.verification.result import Check
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.bench.verification.verdict import verdict
 from gradient_routes.problems.errors import InputError
+
+NAME = "at a second point"
+STATIONARY = "J is stationary at p, where a gradient of zero passes: judged at a point 5 % away"
+DIFFERS = "at p the gradient agrees with differences; at a point 5 % away it does not"
 
 
 def check(subject: Subject, plan: Plan, accept: float = 0.0) -> Check:
@@ -45,6 +50,40 @@ def _checked(subject: Subject, plan: Plan, J: Guarded, accepted: float) -> Check
     if not np.isfinite(seen.J_0):
         return messages.on_no_value(subject.name, J)
     seen.run()
-    found = diagnose(seen)
-    found = messages.explained(replace(found, verdict=verdict(found)), seen)
+    found = judged(seen)
+    if found.verdict == "agrees" and seen.elsewhere is not None:
+        found = _at_a_second_point(seen, found)
     return replace(found, remarks=messages.remarks(found, seen))
+
+
+def judged(seen: Examination) -> Check:
+    """Diagnosis, verdict and words, from the readings there are."""
+    found = diagnose(seen)
+    return messages.explained(replace(found, verdict=verdict(found)), seen)
+
+
+def _at_a_second_point(seen: Examination, found: Check) -> Check:
+    """A gradient that agrees at p: what a second point says, where p cannot tell or where they disagree."""
+    assert seen.elsewhere is not None
+    moved = seen.subject.moved(seen.elsewhere)
+    (line,) = directions(moved, 1, seen.plan.seed + 5)
+    line = replace(line, name=NAME)
+    best = found.deciding.level if found.deciding is not None else None
+    h = seen.plan.near(best.h) if best is not None else seen.plan.steps
+    if seen.J.left() < 1 + 2 * len(h):
+        return replace(found, not_done=(*found.not_done, "no second point: the budget is spent"))
+    try:
+        other = Examination.lightly(moved, seen.plan, seen.J, seen.accepted)
+    except Unusable as failure:
+        return replace(found, not_done=(*found.not_done, f"no second point: there {failure}"))
+    other.readings.append(seen.readings[0])  # its noise: few steps show none
+    reading = other.read(line, h)
+    if seen.stationary or reading.says == "plateau":
+        other.readings.clear()
+        other.run()
+        there = judged(other)
+        if there.verdict != "agrees" or seen.stationary:
+            why = STATIONARY if seen.stationary else DIFFERS
+            return replace(there, moved=why, todo=there.todo)
+        reading = other.readings[0]
+    return replace(found, elsewhere=reading)

@@ -17,7 +17,8 @@ COUNT = 3  # random directions of complex steps
 COMPLEX = 1e-9  # relative error left by complex steps and linearized solves of tolerance 1e-12
 CLEAR = 100.0  # noises that a remainder has to exceed
 LARGEST = 0.1  # step below which the remainder is dominated by one power of h
-RATE = 0.15  # tolerance of the rates 1 and 2
+RATE = 0.15  # tolerance of rates
+DECADES = 10.0**2.5  # of steps whose remainders tell a rate
 
 
 def evidence(seen: Examination) -> Iterator[Finding]:
@@ -29,13 +30,20 @@ def evidence(seen: Examination) -> Iterator[Finding]:
 
 
 def taylor(seen: Examination) -> Iterator[Finding]:
-    """Rates of |J(p + h v) - J(p)| ~ h and |J(p + h v) - J(p) - h g.v| ~ h^2, on the first line."""
+    """Rates of |J(p + h v) - J(p)| ~ h and |J(p + h v) - J(p) - h g.v| ~ h^2, on the first line.
+
+    Of the least steps at which they are clear of the noise. What falls faster is sound: a slope of zero, a curvature of
+    zero; a remainder that falls like h is not, nor is a change of J that falls more slowly than h.
+    """
     reading = seen.readings[0]
     q = reading.quotients
-    for order, off, less in ((1, q.forward, ""), (2, q.off_forward, " - h g.v")):
+    for order, off, less, least in ((1, q.forward, "", 1.0), (2, q.off_forward, " - h g.v", 1.0 + 2.0 * RATE)):
         remainder = np.abs(off * q.h)
-        rate = slope(q.h, remainder, (remainder > CLEAR * reading.noise) & (q.h <= LARGEST))
-        value = float("nan") if rate is None else abs(rate - order)
+        clear = (remainder > CLEAR * reading.noise) & (q.h <= LARGEST)
+        if clear.any():
+            clear &= q.h <= DECADES * q.h[clear].min()
+        rate = slope(q.h, remainder, clear)
+        value = float("nan") if rate is None else max(least - rate, 0.0)
         says = f"too few steps above the noise to measure the rate {order}" if rate is None else f"rate {rate:.3g}"
         yield Finding(f"Taylor: J(p + h v) - J(p){less} ~ h^{order}", value, RATE, says)
 

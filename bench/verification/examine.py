@@ -7,12 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
-from gradient_routes.bench.verification.guarded import DOUBLE, Guarded, Returned, gradient_of
+from gradient_routes.bench.verification.elsewhere import second_point
+from gradient_routes.bench.verification.guarded import DOUBLE, Guarded, Returned
 from gradient_routes.bench.verification.lines import Line, by_sensitivity, components, directions
 from gradient_routes.bench.verification.noise import noise
 from gradient_routes.bench.verification.plan import Plan
 from gradient_routes.bench.verification.quotients import Quotients, quotients
 from gradient_routes.bench.verification.reading import Reading, stencil_changes
+from gradient_routes.bench.verification.repeat import Repeated, once, repeated
+from gradient_routes.bench.verification.scales import with_scales
+from gradient_routes.bench.verification.staircase import abrupt, tread_noise
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
 
@@ -20,39 +24,53 @@ EQUAL = 1e-7  # relative error that counts as agreement: differences seldom reso
 PER_EPS = 100.0  # relative error that is rounding, in eps of the gradient's precision
 COARSEST = 1e-3  # largest such error: float16 has three digits
 ALL = 6  # components that are all tested where there are no more
-REPEATS = 4  # further evaluations at p, where two differ
+STATIONARY = 1e-5  # slope of J in a natural step, relative to what J changes by there
+MACRO = 1e-2  # step at which treads are looked for where no range of steps suggests another
+TREADS = 10.0  # noises of J that are its treads rather than chance
 
 
 @dataclass
 class Examination:
     """A subject, its gradient, its objective and the readings made so far.
 
-    repeated   values of J(p), evaluated several times
+    repeated   values of J(p) and gradients, asked for several times
+    elsewhere  a second point (n_p,) at which J has a value
     remembers  by how much calls at other points changed J(p)
+    treads     standard deviation of J in large steps, where small ones lie within a tread
     """
 
     subject: Subject
     plan: Plan
     J: Guarded
-    returned: Returned
-    J_0: float
-    repeated: Array
+    repeated: Repeated
     accepted: float
+    elsewhere: Array | None = None
     readings: list[Reading] = field(default_factory=list)
     remembers: float = 0.0
+    treads: float = 0.0
 
     @classmethod
     def of(cls, subject: Subject, plan: Plan, J: Guarded, accepted: float = 0.0) -> Examination:
-        """Call the gradient once and J(p) twice, more often where the two values differ. Raises Unusable."""
+        """Ask for J and its gradient repeatedly, find the scales that are unknown. Raises Unusable."""
         values = [J(subject.p), J(subject.p)]
-        J.account.gradients += 1
-        returned = gradient_of(subject)
-        if np.isfinite(values).all() and values[0] != values[1]:
-            values += [J(subject.p) for _ in range(REPEATS) if J.left() > 0]
-        repeated = np.array([v for v in values if np.isfinite(v)])
-        J_0 = float(repeated.mean()) if repeated.size else float("nan")
-        rounding = min(PER_EPS * returned.eps, COARSEST) if returned.eps > DOUBLE else 0.0
-        return cls(subject, plan, J, returned, J_0, repeated, max(EQUAL, accepted, rounding))
+        subject = with_scales(subject, J, values[0])
+        q = second_point(subject, J, plan.seed) if np.isfinite(values).all() else None
+        found = repeated(subject, J, values, q)
+        return cls(subject, plan, J, found, _accepted(found.returned, accepted), q, remembers=found.by_calls)
+
+    @classmethod
+    def lightly(cls, subject: Subject, plan: Plan, J: Guarded, accepted: float = 0.0) -> Examination:
+        """Ask for J and its gradient once: of a tightened, refined or moved version. Raises Unusable."""
+        found = once(subject, J)
+        return cls(subject, plan, J, found, _accepted(found.returned, accepted))
+
+    @property
+    def J_0(self) -> float:
+        return self.repeated.J
+
+    @property
+    def returned(self) -> Returned:
+        return self.repeated.returned
 
     @property
     def gradient(self) -> Array:
@@ -62,6 +80,12 @@ class Examination:
     def size(self) -> float:
         """|g w|_2, the expected slope of J along a random natural change."""
         return norm2(self.gradient * self.subject.natural)
+
+    @property
+    def stationary(self) -> bool:
+        """Whether gradient and quotients vanish at p beside what J changes by nearby: a gradient of zero passes."""
+        first = self.readings[0]
+        return first.moves and max(self.size, abs(first.quotient or 0.0)) <= STATIONARY * first.change
 
     def lines(self) -> list[Line]:
         """A random direction first, then components, then the other directions."""
@@ -78,6 +102,7 @@ class Examination:
         for k, line in enumerate(self.lines()):
             if k == 1:
                 self._test_memory()
+                self._test_treads()
             best = self.readings[0].level if self.readings else None
             if self.plan.everywhere or k == 0 or best is None:
                 self.readings.append(self.read(line, self.plan.steps))
@@ -91,11 +116,28 @@ class Examination:
     def _test_memory(self) -> None:
         """J(p) once more: a J that starts from its last solution differs now, and the difference counts as noise."""
         value = self.J(self.subject.p) if self.J.left() > 2 else self.J_0
-        if value == self.J_0 or not np.isfinite(value) or len(self.repeated) > 2:
+        if value == self.J_0 or not np.isfinite(value) or self.repeated.scatters:
             return
-        self.remembers = abs(value - self.J_0)
-        self.repeated = np.append(self.repeated, value)
-        self.readings = [self._reading(r.quotients) for r in self.readings]
+        self.remembers = max(self.remembers, abs(value - self.J_0))
+        self._read_again()
+
+    def _test_treads(self) -> None:
+        """Where ranges of steps contradict each other, or the gradient: are the small ones within a tread of J?"""
+        reading = self.readings[0]
+        if reading.level is None or not (reading.says == "plateau" or reading.contradicted):
+            return
+        other = min(reading.contradicted, key=lambda a: a.uncertainty, default=None)
+        small, large = sorted((reading.level, other or reading.level), key=lambda a: a.h)
+        h = large.h if other is not None else max(large.h, MACRO)
+        sigma = tread_noise(self.J, self.subject, reading.quotients.line, h)
+        if sigma is not None and sigma > TREADS * reading.noise and abrupt(reading.quotients, small.value, self.J.eps):
+            self.treads = sigma
+            self._read_again()
+
+    def _read_again(self) -> None:
+        """With another noise of J."""
+        readings, self.readings = self.readings, []
+        self.readings = [self._reading(r.quotients) for r in readings]
 
     def _extended(self, reading: Reading) -> Reading:
         """With as many steps again, on the better side, where few steps leave a component or the line undecided."""
@@ -113,8 +155,15 @@ class Examination:
 
     def _reading(self, q: Quotients) -> Reading:
         few = len(q.h) < len(self.plan.steps) and self.readings  # all steps of the first line estimate noise better
-        sigma = self.readings[0].noise if few else max(noise(q, self.J.eps, self.repeated), self.remembers)
+        own = noise(q, self.J.eps, self.repeated.values)
+        sigma = self.readings[0].noise if few else max(own, self.remembers, self.treads)
         by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
         natural_change = self.readings[0].change if self.readings else 0.0
         changes = stencil_changes(self.subject, q.line.v)
-        return Reading(q, sigma, self.size, self.accepted, by_nature, changes, natural_change)
+        return Reading(q, sigma, self.size, self.accepted, by_nature, changes, natural_change, self.J.eps)
+
+
+def _accepted(returned: Returned, accepted: float) -> float:
+    """The relative error that counts as agreement."""
+    rounding = min(PER_EPS * returned.eps, COARSEST) if returned.eps > DOUBLE else 0.0
+    return max(EQUAL, accepted, rounding)

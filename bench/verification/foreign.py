@@ -14,6 +14,7 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, default_label
 
 Bounds = tuple[Any, Any]
+DECADES = 1e3  # ratio of magnitudes that tell the scale of a parameter that starts at 0
 OPTIONAL = ("scale", "bounds", "names", "tighten", "active_set")
 
 
@@ -73,7 +74,8 @@ def subject(
     n_p = len(p)
     _all(np.isfinite(p), lambda i: f"start[{i}] is not finite - start at a finite point")
     s = _natural_scale(p) if scale is None else _vector(scale, n_p, "scale")
-    _all((s > 0) & np.isfinite(s), lambda i: f"scale[{i}] = {s[i]:g} - give scales > 0 and finite")
+    wrong = (s <= 0) | np.isinf(s)
+    _all(~wrong, lambda i: f"scale[{i}] = {s[i]:g} - give scales > 0 and finite")
     lower, upper = _bounds(bounds, n_p)
     spans = [f"{a:g} to {b:g}" for a, b in zip(lower, upper, strict=True)]
     _all(lower < upper, lambda i: f"bounds[{i}] = {spans[i]} - give (lower, upper), lower < upper")
@@ -103,10 +105,16 @@ def _all(holds: Array, otherwise: Callable[[int], str]) -> None:
 
 
 def _natural_scale(p: Array) -> Array:
-    """The default natural changes: |p_i|, and for zeros the median of the others, or 1."""
+    """The default natural changes: |p_i|, and for zeros the median of the others where these are alike, or 1.
+
+    NaN, to be found from J, for zeros beside others that are of different magnitudes, or far from 1.
+    """
     size = np.abs(p)
     others = size[size > 0]
-    return np.where(size > 0, size, np.median(others) if others.size else 1.0)
+    if not others.size:
+        return np.ones_like(p)
+    alike = others.max() <= DECADES * others.min() and 1.0 / DECADES <= np.median(others) <= DECADES
+    return np.where(size > 0, size, np.median(others) if alike else np.nan)
 
 
 def _vector(values: Any, n_p: int | None, what: str) -> Array:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.verification.examine import Examination
 from gradient_routes.bench.verification.lines import Line, components
 from gradient_routes.bench.verification.plateau import DIFFERENT
@@ -17,6 +19,7 @@ from gradient_routes.problems.problem import Array
 
 MOST = 4  # wrong components searched for, beyond those found on the lines of the plan
 AROUND = 10.0 ** np.array([-0.5, 0.0, 0.5])  # steps about the best one, to measure a component that was found
+SEVERAL = 3  # components of the plan, all wrong: the search among the others ends
 ALIKE = 0.02  # relative scatter of factors that are the same factor
 
 
@@ -46,12 +49,14 @@ class Located:
 
     slope      given / found of the whole gradient along the direction that showed the plateau
     everywhere more components are wrong than were searched for
+    contrast   the least error of the wrong components over the largest that the right ones may have
     """
 
     worst: tuple[Worst, ...]
     right: int = 0
     everywhere: bool = False
     slope: float | None = None
+    contrast: float = 0.0
 
     @property
     def factor(self) -> float | None:
@@ -106,8 +111,19 @@ class Search:
         if not self.can_call(len(AROUND)):
             return None
         (line,) = components(self.seen.subject, [i])
-        reading = replace(self.plateau, quotients=self._along(line, self.h * AROUND), changes=None, natural_change=0.0)
+        reading = replace(self.plateau, quotients=self._along(line, self.h * AROUND), changes=None)
         return wrong_component(reading, self.seen.subject) if reading.says == "plateau" else None
+
+    def would_show(self, worst: Sequence[Worst], members: Array) -> bool:
+        """Whether these components, were they off by the factors of the wrong ones, would have differed."""
+        excess = min((abs(w.given - w.found) / (abs(w.found) or abs(w.given)) for w in worst), default=0.0)
+        return min(excess, 1.0) * norm2((self.gradient * self.seen.subject.natural)[members]) > self.allowed
+
+    def contrast(self, worst: Sequence[Worst]) -> float:
+        """The least error of the wrong components over what the others may be off by."""
+        natural = self.seen.subject.natural
+        least = min((abs(w.given - w.found) * natural[w.index] for w in worst), default=0.0)
+        return least / self.allowed if self.allowed else math.inf
 
     def _along(self, line: Line, h: Array) -> Quotients:
         return quotients(self.seen.J, self.seen.J_0, self.seen.subject, self.gradient, line, h)
@@ -118,12 +134,12 @@ def locate(seen: Examination, search: Search | None) -> Located:
     known = [r for r in seen.readings if r.index is not None]
     worst = [wrong_component(r, seen.subject) for r in known if r.says == "plateau"]
     n_p = len(seen.gradient)
+    if len(known) == n_p:
+        agreeing = [r for r in known if r.says == "agrees"]
+        everywhere, slope = len(worst) == n_p > 1, None if search is None else search.ratio
+        return _sorted(worst, len(agreeing), everywhere, slope, _contrast_of(known, agreeing))
     if search is None:
         return _sorted(worst)
-    if len(worst) == len(known) >= 3:
-        return _sorted(worst, everywhere=True, slope=search.ratio)
-    if len(known) == n_p:
-        return _sorted(worst, right=n_p - len(worst))
     for w in worst:
         search.gradient[w.index] = w.found
     others = np.setdiff1d(np.arange(n_p), [r.index for r in known])
@@ -131,7 +147,10 @@ def locate(seen: Examination, search: Search | None) -> Located:
         if not search.can_call(1):
             return _sorted(worst)
         if not search.wrong(others):
-            return _sorted(worst, right=n_p - len(worst))
+            right = n_p - len(worst) if search.would_show(worst, others) else 0
+            return _sorted(worst, right, contrast=search.contrast(worst))
+        if len(worst) == len(known) >= SEVERAL:
+            break
         i = search.one(others)
         found = None if i is None else search.measure(i)
         if found is None:
@@ -140,6 +159,13 @@ def locate(seen: Examination, search: Search | None) -> Located:
         search.gradient[found.index] = found.found
         others = np.setdiff1d(others, [found.index])
     return _sorted(worst, everywhere=True, slope=search.ratio)
+
+
+def _contrast_of(known: Sequence[Reading], agreeing: Sequence[Reading]) -> float:
+    """Of components that have all been read."""
+    right = max((abs(r.level.value) + r.level.uncertainty for r in agreeing if r.level is not None), default=0.0)
+    wrong = min((abs(r.level.value) for r in known if r.says == "plateau" and r.level is not None), default=0.0)
+    return wrong / right if right else math.inf if wrong else 0.0
 
 
 def wrong_component(reading: Reading, subject: Subject) -> Worst:
@@ -151,5 +177,12 @@ def wrong_component(reading: Reading, subject: Subject) -> Worst:
     return Worst(subject.label(i), i, reading.slope / w, quotient / w if abs(quotient) > level.uncertainty else 0.0)
 
 
-def _sorted(worst: Sequence[Worst], right: int = 0, everywhere: bool = False, slope: float | None = None) -> Located:
-    return Located(tuple(sorted(worst, key=lambda w: -abs(w.given - w.found))), right, everywhere, slope)
+def _sorted(
+    worst: Sequence[Worst],
+    right: int = 0,
+    everywhere: bool = False,
+    slope: float | None = None,
+    contrast: float = 0.0,
+) -> Located:
+    ordered = sorted(worst, key=lambda w: -abs(w.given - w.found))
+    return Located(tuple(ordered), right, everywhere, slope, contrast)

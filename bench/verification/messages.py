@@ -13,6 +13,7 @@ from gradient_routes.bench.verification.guarded import DOUBLE, Accident, Guarded
 from gradient_routes.bench.verification.locate import Located, Worst
 from gradient_routes.bench.verification.reading import Reading
 from gradient_routes.bench.verification.result import Check
+from gradient_routes.bench.verification.verdict import STANDS, certain
 
 SHOWN = 3  # components and lines named in a sentence
 NEXT_TO_ONE = 0.01  # a factor that close to 1 is given by its distance
@@ -35,18 +36,47 @@ def on_no_value(name: str, J: Guarded) -> Check:
 def explained(check: Check, seen: Examination) -> Check:
     """The check with its sentence, the next step and, on a plateau, the culprit."""
     reading = check.deciding
+    if check.verdict == "unrepeatable":
+        assert check.unrepeatable is not None
+        todo = "start every call from the same state, with buffers of its own, whatever was asked for before"
+        return replace(check, says=check.unrepeatable, todo=todo, culprit="a state kept between calls")
     if reading is None:
         says = "no line has three steps at which J is finite"
         return replace(check, says=says, todo="make J computable near p, or correct its bounds")
     if reading.says == "plateau":
         return _on_plateau(check, reading)
     if check.verdict == "non-smooth":
-        says, todo = _on_kink(check, reading)
+        says, todo = _on_break(reading) if reading.broken is not None else _on_kink(check, reading)
     elif check.verdict == "agrees":
         says, todo = _on_agreement(check, reading)
+    elif check.verdict == "undetermined":
+        says, todo = _on_contradiction(check, reading)
     else:
         says, todo = _on_noise(check, reading, seen.J.eps > DOUBLE)
     return replace(check, says=says, todo=todo)
+
+
+def _on_contradiction(check: Check, reading: Reading) -> tuple[str, str]:
+    """The quotients agree, and something else does not allow to say so."""
+    if not check.moves:
+        return (
+            "J did not change on any line, and the gradient is zero: this point cannot tell",
+            "check that J depends on p, and that its solver took a step: an absolute tolerance may be met at once",
+        )
+    failed = next(f for f in check.findings if f.sound is False)
+    says = f"quotients agree along {reading.name}, but {failed.name} does not hold: {failed.says}"
+    return says, "look at J near p: it is no differentiable function there, or dominated by higher derivatives"
+
+
+def _on_break(reading: Reading) -> tuple[str, str]:
+    found = reading.broken
+    assert found is not None
+    sides = " and ".join(found.sides)
+    if found.kind == "jump":
+        says = f"a jump: J(p + h v) - J(p) tends to {found.size:.3g} {sides} of p along {reading.name}, not to 0"
+        return says, "move p off the jump, or make J continuous: it has no gradient there"
+    says = f"an infinite slope: J(p + h v) - J(p) falls like h^{found.size:.2g} {sides} of p along {reading.name}"
+    return says, "move p away, or bound it: J has no gradient there"
 
 
 def _on_agreement(check: Check, reading: Reading) -> tuple[str, str]:
@@ -103,54 +133,91 @@ def _on_noise(check: Check, reading: Reading, single: bool) -> tuple[str, str]:
 def _on_plateau(check: Check, reading: Reading) -> Check:
     proof, located = check.proof, check.located
     proven = None if proof is None else proof.culprit
+    culprit = proven
     says = f"a plateau of {reading.off:.2g} {_relative(reading)} along {reading.name}, at every step size"
+    if reading.quotients.line.whole and not reading.slope and not np.any(seen_gradient(check)):
+        says += "; the gradient is exactly 0 while J moves: nothing is connected to p"
     if check.verdict == "solver-limited":
-        last = check.tightened[-1]
-        says += f", falls to {last.reading.off:.1e} when the forward solve is tightened by {last.factor:g}"
-        says += f": {_what_moved(check)}"
-        return replace(check, says=says, todo=_tighten_by(check, proven), culprit=proven)
+        return _on_solver(check, says, proven)
     if check.tightened:
-        moved = check.verdict == "undetermined" and check.tightened[-1].moved and not check.not_done
-        how = "moves a little" if moved else "does not fall"
-        says += f", {how} when the forward solve is tightened by {check.tightened[-1].factor:g}"
+        says += f", {_how_it_moved(check)} when the forward solve is tightened by {check.tightened[-1].factor:g}"
     if check.refined is not None:
-        before, after, order = check.refined.before, check.refined.after, check.refined.order
-        says += f"; the whole gradient is off by {before:.2g}, and by {after:.2g} on a mesh of half the size"
+        errors = ", ".join(f"{error:.2g}" for error in check.refined.errors)
+        says += f"; on meshes of half the size each the whole gradient is off by {errors}"
         if check.verdict == "inconsistent-discretization":
-            says += f": the error shrinks like h^{order:.1f}"
+            says += f": the error shrinks like h^{check.refined.order:.1f}"
             todo = "differentiate the discretized problem: discretize first, then optimize"
             return replace(check, says=says, todo=todo, culprit="an adjoint discretized on its own")
-        says += f": h^{order:.1f}, not a discretization error"
-    culprit = proven
+        if check.verdict == "undetermined":
+            says += f": at last like h^{check.refined.order:.1f}, no rate yet"
+            return replace(check, says=says, todo="check on finer meshes: no order shows on these", culprit=culprit)
+        says += f": h^{check.refined.order:.1f}, not a discretization error"
     if located is not None and located.worst:
         says += f"; {_components(located)}"
         culprit = culprit or _component_culprit(located)
+    if check.compared is not None:
+        says += f"; {check.compared}"
     if check.verdict == "undetermined":
-        if check.not_done:
-            says, todo = f"{says}; a tighter solve was not tested", f"fix this first: {check.not_done[0]}"
-        elif check.tightened and check.tightened[-1].moved:
-            todo = "tighten the solver further"
-        else:
-            says += "; a loosely solved J can cause so small a plateau as well as a small wrong term"
-            todo = TIGHTEN
+        says, todo = _on_open_plateau(check, says)
         return replace(check, says=says, todo=todo, culprit=culprit)
     todo = f"look at {culprit}" if culprit else "look for a missing or wrong term in every component"
     if located is not None and located.everywhere and not proven and not check.factors_tested:
-        todo += "; written as a Problem (CONTRIBUTING.md), its factors are tested one by one"
-    if not check.tightened and not check.not_done and not (located is not None and located.right):
+        todo += "; written as a Problem (docs: how to write a problem), its factors are tested one by one"
+    if not check.tightened and not check.not_done and not certain(check):
         todo += f"; to rule out the solver, {TIGHTEN}"
     return replace(check, says=says, todo=todo, culprit=culprit)
 
 
+def seen_gradient(check: Check) -> list[float]:
+    """The slopes of the gradient on all lines."""
+    return [r.slope for r in check.readings if np.isfinite(r.slope)]
+
+
+def _on_solver(check: Check, says: str, proven: str | None) -> Check:
+    if not check.tightened:
+        assert check.segment is not None
+        part = abs(check.segment.found) / (abs(check.segment.predicted) or 1.0)
+        says += f"; over a segment of a tenth of the natural change {part:.1e} of it is left: J is solved loosely at p"
+        return replace(check, says=says, todo=TIGHTEN, culprit=proven)
+    last = check.tightened[-1]
+    says += f", falls to {last.reading.off:.1e} when the forward solve is tightened by {last.factor:g}"
+    says += f": {_what_moved(check)}"
+    return replace(check, says=says, todo=_tighten_by(check, proven), culprit=proven)
+
+
+def _how_it_moved(check: Check) -> str:
+    """In numbers, where it moved."""
+    last = max(check.tightened[-1].plateaus, key=lambda r: r.off, default=check.tightened[-1].reading)
+    before = next((r for r in check.readings if r.name == last.name and r.level is not None), None)
+    if before is None or last.level is None or not last.off < STANDS * before.off:
+        return "does not fall"
+    return f"falls from {before.off:.2g} to {last.off:.2g} along {last.name} and no further"
+
+
+def _on_open_plateau(check: Check, says: str) -> tuple[str, str]:
+    if check.not_done:
+        return f"{says}; a tighter solve was not tested", f"fix this first: {check.not_done[0]}"
+    if check.tightened and check.tightened[-1].moved:
+        return says, "tighten the solver further"
+    if check.tightened:
+        return f"{says}: neither J(p) nor the gradient changed in any digit", "let tighten(factor) change the solver"
+    return f"{says}; a loosely solved J can cause so small a plateau as well as a small wrong term", TIGHTEN
+
+
 def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
     """What is unusual about the subject, and what more calls would show."""
-    J, said = seen.J, list(seen.returned.remarks)
+    J, said = seen.J, [*seen.subject.notes, *seen.returned.remarks]
+    if check.moved is not None:
+        said.append(check.moved)
     if J.mutates:
         said.append("the objective changes p in place: it was given copies")
     if seen.remembers:
         said.append(f"J(p) changed by {seen.remembers:.1e} after calls at other points: does it start from the last?")
-    elif len(seen.repeated) > 2:
-        said.append(f"J is not deterministic: {len(seen.repeated)} calls at p scatter by {np.std(seen.repeated):.1e}")
+    elif seen.repeated.scatters:
+        count, scatter = len(seen.repeated.values), np.std(seen.repeated.values)
+        said.append(f"J is not deterministic: {count} calls at p scatter by {scatter:.1e}")
+    if seen.treads:
+        said.append(f"J goes in treads of {seen.treads:.1e}, as rounding inside makes: smaller steps were left out")
     if J.eps > DOUBLE:
         said.append(f"J has the precision of float32: its noise is at least {J.eps * abs(seen.J_0):.1e}")
     if max(J.eps, seen.returned.eps) > DOUBLE:
@@ -161,11 +228,14 @@ def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
         said.append(f"on their bounds, differenced on one side: {names}" + (" ..." if bound.size > SHOWN else ""))
     if J.accidents:
         said.append(_accidents(J.accidents, seen))
-    changes = [np.nan_to_num(r.quotients.forward).any() for r in check.readings if _has_values(r)]
-    if changes and not any(changes):
+    still = [r.name for r in check.readings if r.index is not None and _has_values(r) and not r.moves]
+    if check.readings and not check.moves:
         said.append("J did not change at all: does it depend on p?")
+    elif still:
+        said.append(f"J does not change with {', '.join(still[:SHOWN])}" + (" ..." if len(still) > SHOWN else ""))
     if check.verdict == "agrees" and check.deciding is not None:
-        scaled = [r.name for r in check.readings if r.index is not None and r.level and not r.own_scale]
+        small = [r for r in check.readings if r.index is not None and r.level and not r.own_scale]
+        scaled = [r.name for r in small if r.moves]
         if scaled and len(seen.subject.p) > 1:
             said.append(f"tested relative to the whole gradient, too small on their own: {', '.join(scaled[:SHOWN])}")
         said += _odd_slopes(check.deciding)

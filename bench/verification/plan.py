@@ -29,7 +29,7 @@ class Plan:
     components: int | tuple[int, ...] = 3
     directions: int = 2
     everywhere: bool = False
-    budget: float = 200.0
+    budget: float = 240.0
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -10,9 +10,10 @@ from typing import Literal
 
 import numpy as np
 
+from gradient_routes.bench.verification.breaks import Break, break_at
 from gradient_routes.bench.verification.curve import Curve, fit
-from gradient_routes.bench.verification.guarded import FOREIGN
-from gradient_routes.bench.verification.plateau import DIFFERENT, Level, level
+from gradient_routes.bench.verification.guarded import DOUBLE, FOREIGN
+from gradient_routes.bench.verification.plateau import DIFFERENT, Level, level, levels
 from gradient_routes.bench.verification.quotients import Quotients
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
@@ -22,6 +23,7 @@ RESOLVED = 1e-3  # largest relative uncertainty of a quotient that can judge a g
 NEARER = 0.1  # the same for smaller steps that contradict larger ones
 ZERO = 1e3 * float(np.finfo(np.float64).eps)  # a slope below this part of the change of J is rounding
 TINY = 1e-6  # relative jump of one-sided quotients that is not a kink
+NATURAL = 1e-3  # steps from which on the change of J is one of natural size
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Reading:
     accepted relative error that counts as agreement
     by_nature absolute error of slopes that the gradient may have by its nature, as one by finite differences
     changes  step -> number of active-set changes inside its stencil, where the subject knows
-    natural_change  what J changed by in natural steps along another line
+    natural_change  `change` of another line, sampled more widely
+    eps      of the precision of J
     """
 
     quotients: Quotients
@@ -43,6 +46,7 @@ class Reading:
     by_nature: float = 0.0
     changes: Callable[[float], int] | None = None
     natural_change: float = 0.0
+    eps: float = DOUBLE
 
     @property
     def name(self) -> str:
@@ -56,9 +60,22 @@ class Reading:
     @cached_property
     def level(self) -> Level | None:
         """Of quotient less slope: the gradient is right where the value is zero within its uncertainty."""
-        q = self.quotients
-        noise = self.noise / np.sqrt(2.0) if q.two_sided else 1.5 * self.noise
-        return level(q.h, q.off, noise, NEARER * self.size)
+        return level(self.quotients.h, self.quotients.off, self._noise_of_quotients, NEARER * self.size)
+
+    @property
+    def _noise_of_quotients(self) -> float:
+        return self.noise / float(np.sqrt(2.0)) if self.quotients.two_sided else 1.5 * self.noise
+
+    @cached_property
+    def ranges(self) -> list[Level]:
+        """Every decade of steps whose quotients are one number, to a tenth of the gradient's size."""
+        found = levels(self.quotients.h, self.quotients.off, self._noise_of_quotients)
+        return [a for a in found if a.uncertainty <= NEARER * max(self.size, abs(a.value))]
+
+    @property
+    def contradicted(self) -> list[Level]:
+        """Those of them that contradict the level."""
+        return [] if self.level is None else [a for a in self.ranges if a.contradicts(self.level)]
 
     @cached_property
     def slope(self) -> float:
@@ -89,9 +106,25 @@ class Reading:
 
     @cached_property
     def change(self) -> float:
-        """The largest |J(p +- h v) - J(p)|."""
-        seen = np.abs(np.concatenate([self.quotients.J_plus, self.quotients.J_minus]) - self.quotients.J)
-        return float(np.nanmax(seen)) if np.isfinite(seen).any() else 0.0
+        """The least |J(p +- h v) - J(p)| / h^2 of natural steps: what J changes by in one of them, were it quadratic.
+
+        The least, for J may grow without bounds where a step is not small: as exp(p) does, or a penalty for no solution.
+        """
+        q = self.quotients
+        seen = np.fmax(np.abs(q.J_plus - q.J), np.abs(q.J_minus - q.J)) / q.h**2
+        seen = seen[np.isfinite(seen) & (q.h >= NATURAL)]
+        return float(seen.min()) if seen.size else 0.0
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether J changes at all along this line."""
+        seen = np.concatenate([self.quotients.J_plus, self.quotients.J_minus])
+        return bool((np.isfinite(seen) & (seen != self.quotients.J)).any())
+
+    @cached_property
+    def broken(self) -> Break | None:
+        """The jump of J, or its infinite slope, at p."""
+        return break_at(self.quotients, self.eps)
 
     @property
     def own_scale(self) -> bool:
@@ -148,15 +181,17 @@ class Reading:
 
     @cached_property
     def says(self) -> Says:
+        if self.broken is not None:
+            return "kink"
         if self.level is None:
             return "nothing"
-        if self.inside if self.kink is None else self.between:
+        if self.kink is not None and self.between:
             return "kink"
         value, uncertainty = abs(self.level.value), self.level.uncertainty
         by_nature = min(self.by_nature, RESOLVED * self.size)
         if value > max(DIFFERENT * uncertainty, self.accepted * self.scale, by_nature):
             return "plateau"
-        constant = self.size == 0.0 == self.change
+        constant = self.size == 0.0 and not self.moves
         return "agrees" if uncertainty <= RESOLVED * self.scale or constant else "noise"
 
     @cached_property

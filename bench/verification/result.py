@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -12,6 +13,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
+from gradient_routes.bench.verification.segment import Segment
 
 Verdict = Literal[
     "agrees",
@@ -20,10 +22,13 @@ Verdict = Literal[
     "solver-limited",
     "non-smooth",
     "noise-limited",
+    "unrepeatable",
     "undetermined",
 ]
-EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1}
+EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1, "unrepeatable": 1}
 INCONCLUSIVE = 3
+SHRINKS = 0.6  # order in the mesh size from which on a plateau is one of the discretization
+STAYS, SEVERAL = 0.3, 3  # order up to which it is not, on so many meshes
 MEANING: dict[Verdict, str] = {
     "agrees": "the gradient and the difference quotients differ by no more than the quotients are uncertain by",
     "wrong-gradient": "a difference that no step removes and no tighter forward solve reduces; where the solve cannot"
@@ -31,15 +36,16 @@ MEANING: dict[Verdict, str] = {
     "inconsistent-discretization": "a difference that shrinks like h^k with the mesh size: the adjoint equation was"
     " discretized on its own",
     "solver-limited": "a difference, or noise, that falls when the forward solve is tightened",
-    "non-smooth": "one-sided quotients converge to different numbers, or active sets change between the points",
+    "non-smooth": "one-sided quotients converge to different numbers, or J jumps at p, or its slope there is infinite",
     "noise-limited": "the noise of J leaves no usable step",
+    "unrepeatable": "J or the gradient is another one when it is asked for again at the same point",
     "undetermined": "none of these could be established; the sentence says why",
 }
 
 
 @dataclass(frozen=True)
 class Tightened:
-    """The deciding line again, the forward solve's tolerance times `factor`.
+    """Lines again, the forward solve's tolerance times `factor`; `reading` is the deciding one.
 
     gradient_moved, quotient_moved  relative change of both sides
     moved  whether J(p) or the gradient changed in any digit
@@ -47,18 +53,49 @@ class Tightened:
 
     factor: float
     reading: Reading
+    readings: tuple[Reading, ...]
     gradient_moved: float
     quotient_moved: float
     moved: bool
 
+    @property
+    def plateaus(self) -> list[Reading]:
+        return [r for r in self.readings if r.says == "plateau"]
+
+    @property
+    def sound(self) -> bool:
+        """Whether the whole gradient agrees now, and no line contradicts it."""
+        whole = [r for r in self.readings if r.quotients.line.whole]
+        return not self.plateaus and any(r.says == "agrees" for r in whole)
+
 
 @dataclass(frozen=True)
 class Refined:
-    """|(g - exact) w| / |exact w| before and after the mesh size was halved, and the order between."""
+    """|(g - exact) w| / |exact w| on the mesh and on meshes of half the size each; the order between the last two."""
 
-    before: float
-    after: float
-    order: float
+    errors: tuple[float, ...]
+
+    @property
+    def before(self) -> float:
+        return self.errors[0]
+
+    @property
+    def after(self) -> float:
+        return self.errors[-1]
+
+    @property
+    def order(self) -> float:
+        """log2 of the ratio of the last two."""
+        return math.log2(self.errors[-2] / max(self.errors[-1], float(np.finfo(np.float64).tiny)))
+
+    @property
+    def shrinks(self) -> bool:
+        return self.order >= SHRINKS
+
+    @property
+    def stays(self) -> bool:
+        """Whether the error stays on several meshes: on one it may be that of a mesh too coarse for any rate."""
+        return len(self.errors) >= SEVERAL and self.order <= STAYS
 
 
 @dataclass(frozen=True)
@@ -66,6 +103,10 @@ class Check:
     """verdict; says: the reason, with numbers; todo: what to do next.
 
     readings   every line; deciding: the one the verdict rests on
+    elsewhere  a line through a second point; moved: why a second point was judged instead of p
+    unrepeatable  what differed when it was asked for again
+    segment    the gradient integrated along the deciding line
+    compared   what a comparison with a second point proves
     culprit    the factor, component or functional that is wrong, where it is known
     not_done   tests that were not possible, and why
     calls      objective calls, those of tightened and refined versions included; gradients likewise
@@ -77,6 +118,11 @@ class Check:
     todo: str = ""
     readings: tuple[Reading, ...] = ()
     deciding: Reading | None = None
+    elsewhere: Reading | None = None
+    moved: str | None = None
+    unrepeatable: str | None = None
+    segment: Segment | None = None
+    compared: str | None = None
     tightened: tuple[Tightened, ...] = ()
     refined: Refined | None = None
     located: Located | None = None
@@ -100,6 +146,11 @@ class Check:
     def proof(self) -> Finding | None:
         """The first finding that proves a part of the gradient wrong."""
         return next((f for f in self.findings if f.culprit is not None), None)
+
+    @property
+    def moves(self) -> bool:
+        """Whether J changes at all."""
+        return any(r.moves for r in self.readings)
 
     @property
     def factors_tested(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,19 @@ class Subject:
     """J and dJ/dp at p (n_p,), and what else the author offers.
 
     objective   p -> J(p), a number; gradient: p -> (n_p,)
-    scale       (n_p,) > 0, natural changes: steps are relative to max(|p_i|, scale_i)
+    scale       (n_p,) > 0, natural changes: steps are relative to max(|p_i|, scale_i); NaN: to be found from J
     lower, upper (n_p,) bounds of p; `closed` tells whether J is defined on them
     label       name of component i
     tighten     factor < 1 -> the same subject, its solver tolerance times that
+    scaled      factor -> the same subject, J times that
+    fresh       p -> J(p), computed anew by other means than objective and gradient share
     active_set  p -> a hashable that names the smooth branch of J at p
     refine      () -> the same subject on a mesh of half the size
     exact       () -> dJ/dp (n_p,) by the adjoint method, for comparison
     slopes      V (n_p, m) -> V^T dJ/dp by complex steps
     explain     gradient -> findings on the factors of the gradient
     accuracy    error that the gradient has by its nature, as one by finite differences, relative to |g w| or J
+    notes       what was assumed or left out
     """
 
     name: str
@@ -39,12 +42,21 @@ class Subject:
     closed: bool = True
     label: Callable[[int], str] = default_label
     tighten: Callable[[float], Subject] | None = None
+    scaled: Callable[[float], Subject] | None = None
+    fresh: Callable[[Array], Any] | None = None
     active_set: Callable[[Array], Hashable] | None = None
     refine: Callable[[], Subject | None] | None = None
     exact: Callable[[], Array] | None = None
     slopes: Callable[[Array], Array] | None = None
     explain: Callable[[Array], list[Finding]] | None = None
     accuracy: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def moved(self, q: Array) -> Subject:
+        """The same subject at another point; what is known at p alone does not go with it."""
+        tighten = self.tighten
+        tightened = None if tighten is None else lambda factor: tighten(factor).moved(q)
+        return replace(self, p=q, tighten=tightened, refine=None, exact=None, slopes=None, explain=None, scaled=None)
 
     @property
     def natural(self) -> Array:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
-from gradient_routes.bench.verification.result import Check, Verdict
+from gradient_routes.bench.verification.result import SHRINKS, Check, Verdict
 
+__all__ = ["SHRINKS", "agreed", "certain", "convicted", "solver_explains", "verdict"]
 FALLEN = 1.0 / 3.0  # of a plateau: it has fallen
 STANDS = 0.9  # of a plateau: it has not moved
-SHRINKS = 0.6  # order in the mesh size from which on a plateau is one of the discretization
 OTHERS = 3  # right components for every wrong one, so that the error is local
+CONTRAST = 100.0  # errors of the right components that those of the wrong ones exceed, where J cannot be tightened
 GROSS = 1e-2  # relative error above which no usual solver tolerance explains a plateau
 GROSS_COMPONENT = 0.1  # the same of one component, relative to itself
+UNSOUND = "Taylor"  # evidence on J and the gradient alone, which agreement must not contradict
 
 
 def verdict(c: Check) -> Verdict:
     """What the deciding line says, and on a plateau what explains it."""
+    if c.unrepeatable and not solver_explains(c):
+        return "unrepeatable"
     if c.deciding is None:
         return "undetermined"
     if c.deciding.says == "kink":
@@ -23,20 +27,41 @@ def verdict(c: Check) -> Verdict:
     if c.deciding.says == "plateau":
         return _of_plateau(c)
     if agreed(c.deciding):
-        return "agrees"
-    return "solver-limited" if c.tightened and c.tightened[-1].reading.says == "agrees" else "noise-limited"
+        contradicted = any(f.sound is False and f.name.startswith(UNSOUND) for f in c.findings)
+        return "undetermined" if contradicted or not c.moves else "agrees"
+    return "solver-limited" if c.tightened and c.tightened[-1].sound else "noise-limited"
 
 
 def _of_plateau(c: Check) -> Verdict:
     if solver_explains(c):
         return "solver-limited"
-    if c.refined is not None and c.refined.order >= SHRINKS and not _local(c.located):
-        return "inconsistent-discretization"
-    if c.proof is not None or _local(c.located):
-        return "wrong-gradient"
-    tested = bool(c.tightened) and (c.factors_tested or any(t.moved for t in c.tightened))
-    undecided = _moves(c) if tested else bool(c.not_done) or not _gross(c)
-    return "undetermined" if undecided else "wrong-gradient"
+    if c.refined is not None and not certain(c):
+        if c.refined.shrinks:
+            return "inconsistent-discretization"
+        if not c.refined.stays:
+            return "undetermined"
+    if convicted(c):
+        solver = c.segment is not None and c.segment.by_solver and not certain(c)
+        return "solver-limited" if solver else "wrong-gradient"
+    return "solver-limited" if c.segment is not None and c.segment.by_solver else "undetermined"
+
+
+def convicted(c: Check) -> bool:
+    """Whether a plateau is the gradient's mistake, for what is known so far."""
+    if certain(c) or c.proof is not None:
+        return True
+    if not c.tightened:
+        return not c.not_done and _gross(c)
+    tested = c.factors_tested or any(t.moved for t in c.tightened)
+    return not _moves(c) if tested else not c.not_done and _gross(c)
+
+
+def certain(c: Check) -> bool:
+    """Whether no solver and no mesh makes such an error: it is confined to few components, or alike elsewhere."""
+    if c.compared is not None:
+        return True
+    known = 1.0 if c.tightened or c.factors_tested else CONTRAST
+    return _local(c.located) and c.located is not None and c.located.contrast >= known
 
 
 def agreed(reading: Reading) -> bool:
@@ -48,27 +73,34 @@ def solver_explains(c: Check) -> bool:
     """Whether the error disappears when the forward solve is tightened, or is still falling at the end."""
     if not c.tightened or c.deciding is None:
         return False
-    before, last = _before_last(c), c.tightened[-1].reading
-    if last.says == "agrees":
+    if c.tightened[-1].sound:
         return True
-    plateaus = c.deciding.says == last.says == before.says == "plateau"
-    return plateaus and last.off < FALLEN * c.deciding.off and last.off < STANDS * before.off
+    before = c.tightened[-2].readings if len(c.tightened) > 1 else c.readings
+    falls = [_falls(r, before) and _falls(r, c.readings) for r in c.tightened[-1].plateaus]
+    return c.deciding.says == "plateau" and bool(falls) and all(falls)
+
+
+def _falls(reading: Reading, before: tuple[Reading, ...]) -> bool:
+    """Whether the plateau of a line has fallen below a third."""
+    return any(_same(b, reading) and b.says == "plateau" and reading.off < FALLEN * b.off for b in before)
+
+
+def _same(a: Reading, b: Reading) -> bool:
+    return a.quotients.line is b.quotients.line
 
 
 def _moves(c: Check) -> bool:
-    """Whether tightening reduces the error, but by too little to tell whose it is."""
-    before = _before_last(c)
-    return before.says == "plateau" and c.tightened[-1].reading.off < STANDS * before.off
-
-
-def _before_last(c: Check) -> Reading:
-    assert c.deciding is not None
-    return c.tightened[-2].reading if len(c.tightened) > 1 else c.deciding
+    """Whether tightening reduces the error of every line, but by too little to tell whose it is."""
+    before = c.tightened[-2].readings if len(c.tightened) > 1 else c.readings
+    plateaus = c.tightened[-1].plateaus
+    if not plateaus:
+        return True
+    return all(any(_same(b, r) and r.off < STANDS * b.off for b in before) for r in plateaus)
 
 
 def _gross(c: Check) -> bool:
     """Whether the gradient is off by more than a loosely solved J explains."""
-    whole = max((r.off for r in c.readings if r.says == "plateau" and r.index is None), default=0.0)
+    whole = max((r.off for r in c.readings if r.says == "plateau" and r.quotients.line.whole), default=0.0)
     worst = max((w.off for w in c.located.worst), default=0.0) if c.located is not None else 0.0
     factor = None if c.located is None else c.located.factor
     return whole >= GROSS or worst >= GROSS_COMPONENT or (factor is not None and abs(factor - 1.0) >= GROSS)

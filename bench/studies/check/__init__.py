@@ -48,7 +48,7 @@ STUDY = Study(
         click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract."),
         click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract."),
         at_option,
-        click.option("--budget", type=int, default=200, show_default=True, help="Objective calls at most."),
+        click.option("--budget", type=int, default=240, show_default=True, help="Objective calls at most."),
         click.option("--accept", type=float, default=0.0, metavar="ERROR", help=ACCEPT),
         solver_options,
         click.option("--seed", type=int, default=0, show_default=True, help="Of random directions."),

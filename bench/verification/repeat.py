@@ -1,0 +1,85 @@
+"""J and its gradient asked for again: what gives another answer at the same point cannot be judged.
+
+A gradient that uses the state of the last objective call, that accumulates, that races, or that changes J is right once.
+So J is asked for elsewhere before the gradient is asked for at p, and both are asked for twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.verification.guarded import Guarded, Returned, gradient_of
+from gradient_routes.bench.verification.subject import Subject
+from gradient_routes.problems.problem import Array
+
+REPEATS = 4  # further evaluations at p, where two differ
+ROUNDING = 1e-12  # relative change of J(p) that parallel sums make
+CLEAR = 10.0  # standard deviations of J by which a change of J(p) is one
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """values (m,): J(p), m times; again: the gradient (n_p,) asked for once more, None where the budget did not allow.
+
+    by_gradient, by_calls  |J(p) - J(p)|, the first value and one after the gradient, or J elsewhere, was asked for
+    """
+
+    values: Array
+    returned: Returned
+    again: Array | None = None
+    by_gradient: float = 0.0
+    by_calls: float = 0.0
+
+    @property
+    def J(self) -> float:
+        """The first value, or the mean of values that scatter; NaN where there is none."""
+        if not self.values.size:
+            return float("nan")
+        return float(self.values.mean() if self.scatters else self.values[0])
+
+    @property
+    def scatters(self) -> bool:
+        """Whether values asked for without anything between them differ."""
+        return bool((self.values != self.values[:1]).any())
+
+    def moved(self, natural: Array) -> float:
+        """|(g - g') w|_2 of the two gradients."""
+        return 0.0 if self.again is None else norm2((self.returned.gradient - self.again) * natural)
+
+
+def once(subject: Subject, J: Guarded) -> Repeated:
+    """J(p) and the gradient, each once. Raises Unusable."""
+    value = J(subject.p)
+    J.account.gradients += 1
+    return Repeated(np.array([value])[np.isfinite([value])], gradient_of(subject))
+
+
+def repeated(subject: Subject, J: Guarded, values: list[float], elsewhere: Array | None) -> Repeated:
+    """After J(p), twice: J has just been asked for elsewhere; now the gradient, J(p), the gradient. Raises Unusable."""
+    J.account.gradients += 1
+    first = gradient_of(subject)
+    if not np.isfinite(values).all():
+        return Repeated(np.array([v for v in values if np.isfinite(v)]), first)
+    if values[0] != values[1]:
+        values += [J(subject.p) for _ in range(REPEATS) if J.left() > 0]
+    after = J(subject.p)
+    J.account.gradients += 1
+    again = gradient_of(subject).gradient
+    changed = abs(after - values[0])
+    noise = CLEAR * float(np.std(values)) + ROUNDING * abs(values[0])
+    if not np.isfinite(after) or changed <= noise:
+        return Repeated(np.array([v for v in (*values, after) if np.isfinite(v)]), first, again)
+    by_calls = _by_calls(subject, J, elsewhere, after)
+    return Repeated(np.array(values), first, again, 0.0 if by_calls else changed, changed if by_calls else 0.0)
+
+
+def _by_calls(subject: Subject, J: Guarded, elsewhere: Array | None, before: float) -> bool:
+    """Whether J(p) changes when J is asked for elsewhere, without a gradient."""
+    if elsewhere is None or J.left() < 4:
+        return False
+    J(subject.p)
+    J(elsewhere)
+    return bool(abs(J(subject.p) - before) > ROUNDING * abs(before))
