@@ -59,7 +59,9 @@ def _infinite(h: Array, dJ: Array, rounding: float) -> float | None:
     if len(h) < POINTS or h[-1] - h[0] < DECADES:
         return None
     least = h <= h[0] + DECADES + 1e-9
+    if np.count_nonzero(least) < POINTS:
+        return None
     rates = np.diff(size[least]) / np.diff(h[least])
     rate = float(np.median(rates))
     alike = float(np.abs(rates - rate).max()) <= BOUNDED
-    return rate if BOUNDED < rate < INFINITE and alike and len(rates) >= POINTS - 1 else None
+    return rate if BOUNDED < rate < INFINITE and alike else None

@@ -10,6 +10,7 @@ from gradient_routes.bench.verification.curve import slope
 from gradient_routes.bench.verification.examine import Examination
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.lines import directions
+from gradient_routes.bench.verification.plateau import DIFFERENT
 from gradient_routes.bench.verification.reading import ZERO
 from gradient_routes.problems.errors import RoutesError
 
@@ -17,6 +18,7 @@ COUNT = 3  # random directions of complex steps
 COMPLEX = 1e-9  # relative error left by complex steps and linearized solves of tolerance 1e-12
 CLEAR = 100.0  # noises that a remainder has to exceed
 LARGEST = 0.1  # step below which the remainder is dominated by one power of h
+SECOND = 2
 RATE = 0.15  # tolerance of rates
 DECADES = 10.0**2.5  # of steps whose remainders tell a rate
 
@@ -40,6 +42,8 @@ def taylor(seen: Examination) -> Iterator[Finding]:
     for order, off, less, least in ((1, q.forward, "", 1.0), (2, q.off_forward, " - h g.v", 1.0 + 2.0 * RATE)):
         remainder = np.abs(off * q.h)
         clear = (remainder > CLEAR * reading.noise) & (q.h <= LARGEST)
+        if order == SECOND:  # a gradient of few digits is as far off as they are
+            clear &= np.abs(off) > DIFFERENT * reading.accepted * reading.size
         if clear.any():
             clear &= q.h <= DECADES * q.h[clear].min()
         rate = slope(q.h, remainder, clear)

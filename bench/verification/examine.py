@@ -118,6 +118,8 @@ class Examination:
         value = self.J(self.subject.p) if self.J.left() > 2 else self.J_0
         if value == self.J_0 or not np.isfinite(value) or self.repeated.scatters:
             return
+        if self.J.left() > 2 and self.J(self.subject.p) == self.J_0:
+            return  # one value that was another
         self.remembers = max(self.remembers, abs(value - self.J_0))
         self._read_again()
 
@@ -160,7 +162,8 @@ class Examination:
         by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
         natural_change = self.readings[0].change if self.readings else 0.0
         changes = stencil_changes(self.subject, q.line.v)
-        return Reading(q, sigma, self.size, self.accepted, by_nature, changes, natural_change, self.J.eps)
+        again = not (self.repeated.scatters or self.remembers)
+        return Reading(q, sigma, self.size, self.accepted, by_nature, changes, natural_change, self.J.eps, again)
 
 
 def _accepted(returned: Returned, accepted: float) -> float:

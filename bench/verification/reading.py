@@ -36,7 +36,7 @@ class Reading:
     by_nature absolute error of slopes that the gradient may have by its nature, as one by finite differences
     changes  step -> number of active-set changes inside its stencil, where the subject knows
     natural_change  `change` of another line, sampled more widely
-    eps      of the precision of J
+    eps      of the precision of J; repeatable: whether J is the same again at the same point
     """
 
     quotients: Quotients
@@ -47,6 +47,7 @@ class Reading:
     changes: Callable[[float], int] | None = None
     natural_change: float = 0.0
     eps: float = DOUBLE
+    repeatable: bool = True
 
     @property
     def name(self) -> str:
@@ -124,7 +125,7 @@ class Reading:
     @cached_property
     def broken(self) -> Break | None:
         """The jump of J, or its infinite slope, at p."""
-        return break_at(self.quotients, self.eps)
+        return break_at(self.quotients, self.eps) if self.repeatable else None
 
     @property
     def own_scale(self) -> bool:

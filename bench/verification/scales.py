@@ -12,7 +12,7 @@ from gradient_routes.problems.problem import Array
 
 RESPONSE = 0.1  # of |J(p)|, or of what J changes by when the other parameters change by a tenth
 LEAST, GREATEST = 1e-18, 1e18  # natural changes that are looked for
-FASTEST, SLOWEST = 1e3, 10.0 ** 0.5  # growth of the step between two calls
+FASTEST, SLOWEST = 1e3, 10.0**0.5  # growth of the step between two calls
 MOST = 6  # parameters looked at one by one: more change together
 SHOWN = 3
 

@@ -15,15 +15,14 @@ from gradient_routes.bench.verification.result import Tightened
 from gradient_routes.problems.problem import Array
 
 FACTORS = (1e-3, 1e-6, 1e-9, 1e-12)  # of the forward tolerance; the third and fourth where the second changed nothing
+FELL = 0.1  # of a plateau: the solver was to blame for most of it, and what is left may be its, too
 TWO = 2  # factors that are tried where each changes something
 SWEEP = 2.5  # decades about the best step over which a line is swept, to see the noise of the tightened J
 BESIDE = 0.5  # decades about its best step, where another line is read
 LINES = 5  # read again: directions, and components that differed
 
 
-def tighten(
-    seen: Examination, reading: Reading
-) -> tuple[tuple[Tightened, ...], Examination | None, str | None]:
+def tighten(seen: Examination, reading: Reading) -> tuple[tuple[Tightened, ...], Examination | None, str | None]:
     """The lines with tighter forward solves, until they agree; the last examination; why that stopped early."""
     found: list[Tightened] = []
     last: Examination | None = None
@@ -32,10 +31,10 @@ def tighten(
         again = _tightened(seen, reading, factor)
         if isinstance(again, str):
             return tuple(found), last, again
-        stuck = last is not None and _same(again[1], last)
+        stuck = last is not None and _same(again[1], last) and _fell(again[0].reading, reading)
         found.append(again[0])
         last = again[1]
-        if found[-1].sound or (len(found) >= TWO and not (stuck and found[-1].moved)):
+        if found[-1].sound or (len(found) >= TWO and not stuck):
             break
     return tuple(found), last, None
 
@@ -43,6 +42,10 @@ def tighten(
 def _same(a: Examination, b: Examination) -> bool:
     """Whether J(p) and the gradient are the same numbers: the solver took the same iterate."""
     return a.J_0 == b.J_0 and np.array_equal(a.gradient, b.gradient)
+
+
+def _fell(after: Reading, before: Reading) -> bool:
+    return after.level is not None and before.level is not None and after.off < FELL * before.off
 
 
 def _tightened(seen: Examination, reading: Reading, factor: float) -> tuple[Tightened, Examination] | str:

@@ -21,8 +21,8 @@ from gradient_routes.bench.verification.reading import Reading
 def test_a_right_gradient_of_a_thousand_parameters_costs_few_calls() -> None:
     found = check(J, dJ, P)
     assert (found.verdict, found.exit_code) == ("agrees", 0)
-    assert found.calls <= 200
-    assert found.gradients == 1
+    assert found.calls <= 240
+    assert found.gradients == 3
     line = found.deciding
     assert line.central.floor < 1e-9
     assert line.central.slope == pytest.approx(2.0, abs=0.1)
@@ -34,7 +34,7 @@ def test_a_right_gradient_of_a_thousand_parameters_costs_few_calls() -> None:
 def test_one_wrong_component_in_a_thousand_is_found(index: int, factor: float) -> None:
     found = check(J, wrong(index, factor), P)
     assert (found.verdict, found.exit_code) == ("wrong-gradient", 1)
-    assert found.calls <= 200
+    assert found.calls <= 240
     (worst,) = found.located.worst
     assert worst.index == index
     assert worst.factor == pytest.approx(factor, abs=1e-6)
@@ -46,7 +46,7 @@ def test_three_wrong_components_are_found_within_the_budget() -> None:
     found = check(J, wrong([3, 417, 900], -1.0), P)
     assert {w.index for w in found.located.worst} == {3, 417, 900}
     assert found.located.right == N - 3
-    assert found.calls <= 200
+    assert found.calls <= 240
 
 
 def test_many_wrong_components_are_wrong_however_small_their_share() -> None:

@@ -62,13 +62,14 @@ def test_an_active_set_that_fails_tells_nothing(active_set) -> None:
 
 def test_active_sets_are_asked_for_within_bounds() -> None:
     asked: list[float] = []
-    check(
+    found = check(
         lambda p: float((p**2).sum()),
         lambda p: 2.0 * p,
         np.ones(2),
         bounds=(1.0, 2.0),
         active_set=lambda p: asked.append(float(p.min())),
     )
+    assert found.as_dict()["active_set_changes"] == 0
     assert asked
     assert min(asked) >= 1.0
 
