@@ -1,21 +1,28 @@
-"""The confusion matrix of `routes check`: every sound route and every fault, with the verdict expected of it.
+"""What `routes check` misjudges: every route on every problem, and black boxes of many kinds.
 
-    python -m benchmarks.confusion
+    python -m benchmarks.confusion [--matrix | --boxes] [--seeds N] [--only TEXT] [--jobs N] [--json FILE]
 
-Each cell is one check of a route on a problem at a random point.
+The matrix: each cell is one check of a route on a problem at a random point. The boxes: `benchmarks/boxes/`, of
+seeds 0 to N - 1; --only selects those whose id FAMILY/BOX@SEED contains TEXT. Exit code: 1 where a cell is misjudged
+or a wrong gradient is told `agrees`.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from benchmarks.boxes import report
+from benchmarks.boxes.judging import judge_all
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.render.terminal.tables import console
 from gradient_routes.bench.verification.check import check
@@ -156,8 +163,8 @@ def _cell(judged: Judged | None) -> Text:
     return Text(SHORT.get(judged.check.verdict, judged.check.verdict), style="" if judged.right else "bold red")
 
 
-def main() -> None:
-    out = console()
+def show_matrix(out: Console) -> bool:
+    """Whether no cell is misjudged."""
     found = matrix(cells())
     out.print(table(found))
     for k, problem in enumerate(PROBLEMS):
@@ -165,7 +172,35 @@ def main() -> None:
     out.print(f"{len(found.cells)} cells, {len(found.misjudged)} misjudged")
     for judged in found.misjudged:
         out.print(Text(f"{judged.cell}: {judged.check.verdict}: {judged.check.says}", style="red"))
-    sys.exit(1 if found.misjudged else 0)
+    return not found.misjudged
+
+
+def show_boxes(out: Console, seeds: int, only: str, jobs: int, json: Path | None) -> bool:
+    """Whether no wrong gradient is acquitted."""
+    found = judge_all(seeds, only, jobs)
+    if not found:
+        sys.exit(f"confusion: no box contains {only!r} - see `--boxes --seeds 1` for their ids")
+    report.show(out, found)
+    if json is not None:
+        report.write(found, json)
+    return not any(judged.fault == "acquitted" for judged in found)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--matrix", action="store_true", help="only routes on problems")
+    parser.add_argument("--boxes", action="store_true", help="only black boxes")
+    parser.add_argument("--seeds", type=int, default=5, help="of each family of boxes")
+    parser.add_argument("--only", default="", metavar="TEXT", help="boxes whose id FAMILY/BOX@SEED contains TEXT")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="every check of a box")
+    given = parser.parse_args()
+    out, sound = console(), True
+    if given.matrix or not given.boxes:
+        sound &= show_matrix(out)
+    if given.boxes or not given.matrix:
+        sound &= show_boxes(out, given.seeds, given.only, given.jobs, given.json)
+    sys.exit(0 if sound else 1)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""Black boxes whose gradients are known to be right or wrong: what `routes check` is measured against."""

@@ -1,0 +1,18 @@
+"""All families: importing this registers them."""
+
+from benchmarks.boxes import (  # noqa: F401
+    contact,
+    corners,
+    exploding,
+    loose,
+    mistakes,
+    noisy,
+    ordinary,
+    points,
+    scales,
+    state,
+    treads,
+)
+from benchmarks.boxes.box import FAMILIES
+
+__all__ = ["FAMILIES"]
