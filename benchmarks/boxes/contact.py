@@ -122,7 +122,7 @@ def obstacle_problem(rng: Rng) -> Iterator[Box]:
 @family(KIND)
 def plastic_bar(rng: Rng) -> Iterator[Box]:
     """Return mapping: forces against strains p beyond yield; J is C1 there."""
-    n, E, y, H = int(rng.integers(1, 20)), 10.0, 1.0, rng.uniform(0.5, 3.0)
+    n, E, y, H = int(rng.integers(2, 20)), 10.0, 1.0, rng.uniform(0.5, 3.0)
     p = rng.uniform(0.02, 0.3, n)
     p[0] = y / E
 

@@ -88,8 +88,8 @@ MORE: tuple[Fault, ...] = (factor, offset, component, dropped, permuted)
 
 def some(model: Model, rng: np.random.Generator, count: int, among: tuple[Fault, ...] = MORE) -> Iterator[Faulty]:
     """So many different faults; where all components are alike, no permutation shows."""
-    for k in rng.permutation(len(among))[:count]:
-        fault = among[int(k)]
-        g = model.g(model.p) * natural(model)
-        alike = len(g) == 1 or float(np.ptp(g)) < 0.1 * float(np.abs(g).max())
-        yield (factor if fault is permuted and alike else fault)(model, rng)
+    g = model.g(model.p) * natural(model)
+    alike = float(np.ptp(g)) < 0.1 * float(np.abs(g).max())
+    shown = [fault for fault in among if not (fault is permuted and alike)]
+    for k in rng.permutation(len(shown))[:count]:
+        yield shown[int(k)](model, rng)

@@ -122,8 +122,8 @@ def all_zero(rng: Rng) -> Iterator[Box]:
     for name, w in (("", 1.0), ("-fine", 1e-5)):
         c = rng.uniform(0.5, 1.5, int(rng.integers(1, 20)))
         model = Model(
-            lambda p, c=c, w=w: np.sum(np.exp(c * p / w)),
-            lambda p, c=c, w=w: c / w * np.exp(c * p / w),
+            lambda p, c=c, w=w: np.sum(np.arctan(c * p / w + 1.0)),
+            lambda p, c=c, w=w: c / w / (1.0 + (c * p / w + 1.0) ** 2),
             np.zeros(len(c)),
         )
         or_open = OPEN if name else frozenset()
