@@ -53,7 +53,7 @@ def _jump(h: Array, dJ: Array, rounding: float) -> float | None:
 
 
 def _infinite(h: Array, dJ: Array, rounding: float) -> float | None:
-    """The rate of the least increments that are clear of rounding, where it is the same one below 1 over some decades."""
+    """The rate of the least increments clear of rounding, where it is the same one below 1 over some decades."""
     known = np.isfinite(dJ) & (np.abs(dJ) > rounding)
     h, size = np.log10(h[known]), np.log10(np.abs(dJ[known]))
     if len(h) < POINTS or h[-1] - h[0] < DECADES:

@@ -109,7 +109,7 @@ class Reading:
     def change(self) -> float:
         """The least |J(p +- h v) - J(p)| / h^2 of natural steps: what J changes by in one of them, were it quadratic.
 
-        The least, for J may grow without bounds where a step is not small: as exp(p) does, or a penalty for no solution.
+        The least, for J may grow without bounds where a step is not small: as exp(p) does, or a value for failure.
         """
         q = self.quotients
         seen = np.fmax(np.abs(q.J_plus - q.J), np.abs(q.J_minus - q.J)) / q.h**2

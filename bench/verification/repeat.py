@@ -1,6 +1,6 @@
 """J and its gradient asked for again: what gives another answer at the same point cannot be judged.
 
-A gradient that uses the state of the last objective call, that accumulates, that races, or that changes J is right once.
+A gradient that uses the state of the last objective call, that accumulates, races, or changes J is right once.
 So J is asked for elsewhere before the gradient is asked for at p, and both are asked for twice.
 """
 
