@@ -76,6 +76,7 @@ def _at_a_second_point(seen: Examination, found: Check) -> Check:
         other = Examination.lightly(moved, seen.plan, seen.J, seen.accepted)
     except Unusable as failure:
         return replace(found, not_done=(*found.not_done, f"no second point: there {failure}"))
+    other.elsewhere = seen.subject.p
     other.readings.append(seen.readings[0])  # its noise: few steps show none
     reading = other.read(line, h)
     if seen.stationary or reading.says == "plateau":

@@ -14,6 +14,7 @@ import numpy as np
 from gradient_routes.bench.verification.examine import Examination
 from gradient_routes.bench.verification.guarded import Unusable
 from gradient_routes.bench.verification.lines import Line, components
+from gradient_routes.bench.verification.locate import Located, Worst
 from gradient_routes.bench.verification.plateau import DIFFERENT
 from gradient_routes.bench.verification.quotients import quotients
 from gradient_routes.bench.verification.reading import Reading
@@ -31,12 +32,13 @@ FEWEST = 2  # exact components, and others off by one factor
 
 @dataclass(frozen=True)
 class Pair:
-    """Along one line: slope by the gradient, quotient, uncertainty of the quotient."""
+    """Along one line: slope by the gradient, quotient at the step h, uncertainty of the quotient."""
 
     line: Line
     slope: float
     quotient: float
     uncertainty: float
+    h: float
 
     @property
     def off(self) -> float:
@@ -58,14 +60,13 @@ class Pair:
         return abs(self.off) <= DIFFERENT * self.uncertainty and abs(self.slope) > CLEAR**2 * self.uncertainty
 
 
-def compared(seen: Examination, reading: Reading) -> str | None:
+def compared(seen: Examination, reading: Reading, located: Located) -> str | None:
     """What proves the gradient wrong, in words, from the plateau of `reading`; None where nothing does."""
-    assert reading.level is not None
-    h, uncertainty = reading.level.h, reading.level.uncertainty
     here = [pair for r in seen.readings if (pair := _pair(r)) is not None]
-    chosen, pairs = _chosen(here, reading), []
+    here += [_pair_of(w, seen, reading) for w in located.worst if w.index not in {p.line.index for p in here}]
+    chosen, pairs = _chosen(here, reading, {w.index for w in located.worst}), []
     for q in _points(seen, len(here)):
-        found = _at(seen, q, [p.line for p in chosen], h, uncertainty)
+        found = _at(seen, q, chosen)
         if found is None:
             continue
         other, there = found
@@ -76,7 +77,7 @@ def compared(seen: Examination, reading: Reading) -> str | None:
     factor = _factor([*here, *pairs])
     if factor is not None and pairs and len(pairs) + len(here) >= FEW:
         return f"slopes of J and of the gradient have the ratio {factor:.6g} on every line, also at a second point"
-    return _in_part(seen, here, h, uncertainty)
+    return _in_part(seen, [*here, *pairs], _pair(reading))
 
 
 def _points(seen: Examination, lines: int) -> Iterator[Array]:
@@ -106,38 +107,43 @@ def _there(seen: Examination, other: Examination, before: Sequence[Pair], after:
 def _pair(r: Reading) -> Pair | None:
     if r.level is None or r.quotient is None:
         return None
-    return Pair(r.quotients.line, r.slope, r.quotient, r.level.uncertainty)
+    return Pair(r.quotients.line, r.slope, r.quotient, r.level.uncertainty, r.level.h)
 
 
-def _chosen(here: Sequence[Pair], reading: Reading) -> list[Pair]:
-    """The deciding line first, then directions, then components."""
-    ordered = sorted(here, key=lambda p: (p.line is not reading.quotients.line, p.line.index is not None))
-    return ordered[:LINES]
+def _pair_of(w: Worst, seen: Examination, reading: Reading) -> Pair:
+    """A component that the search has found, known as well as the line that showed it."""
+    assert reading.level is not None
+    (line,) = components(seen.subject, [w.index])
+    natural = float(seen.subject.natural[w.index])
+    return Pair(line, w.given * natural, w.found * natural, reading.level.uncertainty, reading.level.h)
 
 
-def _at(
-    seen: Examination, q: Array, lines: Sequence[Line], h: float, uncertainty: float
-) -> tuple[Examination, list[Pair]] | None:
-    """The subject at another point, and pairs there; None where there is no gradient."""
-    if seen.J.left() < 1 + 2 * len(lines):
+def _chosen(here: Sequence[Pair], reading: Reading, wrong: set[int]) -> list[Pair]:
+    """The deciding line first, then wrong components, directions, other components."""
+
+    def order(p: Pair) -> tuple[bool, bool, bool]:
+        return p.line is not reading.quotients.line, p.line.index not in wrong, p.line.index is not None
+
+    return sorted(here, key=order)[:LINES]
+
+
+def _at(seen: Examination, q: Array, pairs: Sequence[Pair]) -> tuple[Examination, list[Pair]] | None:
+    """The subject at another point, and the same lines there; None where there is no gradient."""
+    if seen.J.left() < 1 + 2 * len(pairs):
         return None
     try:
         other = Examination.lightly(seen.subject.moved(q), seen.plan, seen.J, seen.accepted)
     except Unusable:
         return None
-    pairs = _quotients(other, lines, h, uncertainty)
-    return (other, pairs) if pairs else None
+    found = [pair for p in pairs if (pair := _quotient(other, p.line, p)) is not None]
+    return (other, found) if found else None
 
 
-def _quotients(seen: Examination, lines: Sequence[Line], h: float, uncertainty: float) -> list[Pair]:
-    """By one central difference each, at the step that was best."""
-    found = []
-    for line in lines:
-        q = quotients(seen.J, seen.J_0, seen.subject, seen.gradient, line, np.array([h]))
-        slope, off = 0.5 * float(q.s_plus[0] + q.s_minus[0]), float(q.off_central[0])
-        if np.isfinite(off):
-            found.append(Pair(line, slope, slope + off, uncertainty))
-    return found
+def _quotient(seen: Examination, line: Line, like: Pair) -> Pair | None:
+    """By one central difference, at the step that was best and as certain as there."""
+    q = quotients(seen.J, seen.J_0, seen.subject, seen.gradient, line, np.array([like.h]))
+    slope, off = 0.5 * float(q.s_plus[0] + q.s_minus[0]), float(q.off_central[0])
+    return Pair(line, slope, slope + off, like.uncertainty, like.h) if np.isfinite(off) else None
 
 
 def _factor(pairs: Sequence[Pair]) -> float | None:
@@ -164,16 +170,16 @@ def _constant(both: Sequence[tuple[Pair, Pair]]) -> bool:
     return True
 
 
-def _in_part(seen: Examination, here: Sequence[Pair], h: float, known: float) -> str | None:
-    """Exact components beside others that are off by one factor."""
-    tested = [p.line.index for p in here if p.line.index is not None]
-    others = np.setdiff1d(np.arange(len(seen.gradient)), tested)
-    rng = np.random.default_rng(seen.plan.seed + 4)
-    few = sorted(map(int, rng.permutation(others)[:MORE]))
-    more = _quotients(seen, components(seen.subject, few), h, known) if seen.J.left() >= 2 * len(few) else []
-    parts = [p for p in here if p.line.index is not None] + more
+def _in_part(seen: Examination, pairs: Sequence[Pair], like: Pair | None) -> str | None:
+    """Exact components beside others that are off by one factor, at any point."""
+    parts = [p for p in pairs if p.line.index is not None]
+    others = np.setdiff1d(np.arange(len(seen.gradient)), [p.line.index for p in parts])
+    few = sorted(map(int, np.random.default_rng(seen.plan.seed + 4).permutation(others)[:MORE]))
+    if like is not None and seen.J.left() >= 2 * len(few):
+        lines = components(seen.subject, few)
+        parts += [pair for line in lines if (pair := _quotient(seen, line, like)) is not None]
     exact, off = [p for p in parts if p.exact], [p for p in parts if p.clear]
     factor = _factor(off) if len(off) >= FEWEST <= len(exact) else None
-    if factor is None or len(exact) + len(off) < len(parts):
+    if factor is None:
         return None
-    return f"{len(exact)} components are exact, {len(off)} are off by the factor {1.0 / factor:.6g}"
+    return f"{len(exact)} slopes along components are exact, {len(off)} are off by the factor {1.0 / factor:.6g}"

@@ -15,7 +15,7 @@ from gradient_routes.bench.verification.comparison import compared
 from gradient_routes.bench.verification.evidence import evidence
 from gradient_routes.bench.verification.examine import Examination
 from gradient_routes.bench.verification.finding import Finding
-from gradient_routes.bench.verification.locate import Search, locate
+from gradient_routes.bench.verification.locate import Located, Search, locate
 from gradient_routes.bench.verification.reading import Reading
 from gradient_routes.bench.verification.refinement import refine
 from gradient_routes.bench.verification.result import Check, Refined
@@ -31,7 +31,7 @@ def diagnose(seen: Examination) -> Check:
     reading = deciding(seen.readings)
     name, readings, findings = seen.subject.name, tuple(seen.readings), tuple(evidence(seen))
     found = Check(name, readings=readings, deciding=reading, findings=findings, noise=readings[0].noise)
-    found = replace(found, unrepeatable=unrepeatable(seen))
+    found = replace(found, unrepeatable=unrepeatable(seen, reading))
     if reading is None or reading.says == "kink" or verdict.agreed(reading):
         return found
     judged = seen
@@ -43,10 +43,11 @@ def diagnose(seen: Examination) -> Check:
         return found
     if seen.subject.refine is not None and (found.proof is None or found.proof.by_mesh):
         found = _refined(found, seen, reading)
-    found = replace(found, located=located(judged))
+    where = located(judged)
+    found = replace(found, located=where)
     if seen.subject.tighten is None and found.proof is None:
         if not verdict.convicted(found):
-            found = replace(found, compared=compared(seen, reading))
+            found = replace(found, compared=compared(seen, reading, where))
         if not verdict.certain(found):
             found = replace(found, segment=segment(seen, reading))
     return found
@@ -60,16 +61,20 @@ def _refined(found: Check, seen: Examination, reading: Reading) -> Check:
     return replace(found, findings=(*found.findings, why))
 
 
-def located(judged: Examination):
+def located(judged: Examination) -> Located:
     """The wrong components, by the tightest J there is."""
     shown = [r for r in judged.readings if r.index is None and r.says == "plateau"]
     return locate(judged, Search(judged, worst(shown)) if shown else None)
 
 
 def deciding(readings: Sequence[Reading]) -> Reading | None:
-    """The line that the verdict rests on: kinks before plateaus before agreement of the whole before noise."""
+    """The line that the verdict rests on: kinks before plateaus before agreement of the whole before noise.
+
+    A kink seen along single components does not excuse a plateau along a direction.
+    """
     by = {says: [r for r in readings if r.says == says] for says in ("kink", "plateau", "agrees", "noise")}
-    if by["kink"]:
+    wrong = [r for r in by["plateau"] if r.index is None]  # beyond both slopes of any kink
+    if by["kink"] and not (wrong and all(r.index is not None for r in by["kink"])):
         return max(by["kink"], key=lambda r: (r.broken is not None, r.kink or 0.0))
     if by["plateau"]:
         return worst(by["plateau"])

@@ -20,6 +20,7 @@ CLEAR = 100.0  # noises that a remainder has to exceed
 LARGEST = 0.1  # step below which the remainder is dominated by one power of h
 SECOND = 2
 RATE = 0.15  # tolerance of rates
+SCATTER = 0.3  # part of a rate below which a remainder is noise of J; a jump of J is told by itself
 DECADES = 10.0**2.5  # of steps whose remainders tell a rate
 
 
@@ -47,8 +48,10 @@ def taylor(seen: Examination) -> Iterator[Finding]:
         if clear.any():
             clear &= q.h <= DECADES * q.h[clear].min()
         rate = slope(q.h, remainder, clear)
-        value = float("nan") if rate is None else max(least - rate, 0.0)
+        scatters = rate is not None and rate < SCATTER * order
+        value = float("nan") if rate is None or scatters else max(least - rate, 0.0)
         says = f"too few steps above the noise to measure the rate {order}" if rate is None else f"rate {rate:.3g}"
+        says += ": noise" if scatters else ""
         yield Finding(f"Taylor: J(p + h v) - J(p){less} ~ h^{order}", value, RATE, says)
 
 

@@ -25,12 +25,13 @@ ALIKE = 0.02  # relative scatter of factors that are the same factor
 
 @dataclass(frozen=True)
 class Worst:
-    """A wrong component: dJ/dp_i given by the gradient and found by differences."""
+    """A wrong component: dJ/dp_i given by the gradient and found by differences; share: its error over |g w|_2."""
 
     name: str
     index: int
     given: float
     found: float
+    share: float = 1.0
 
     @property
     def factor(self) -> float | None:
@@ -174,7 +175,8 @@ def wrong_component(reading: Reading, subject: Subject) -> Worst:
     assert quotient is not None
     assert level is not None
     w = float(subject.natural[i])
-    return Worst(subject.label(i), i, reading.slope / w, quotient / w if abs(quotient) > level.uncertainty else 0.0)
+    found = quotient / w if abs(quotient) > level.uncertainty else 0.0
+    return Worst(subject.label(i), i, reading.slope / w, found, abs(level.value) / (reading.size or abs(level.value)))
 
 
 def _sorted(

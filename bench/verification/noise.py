@@ -18,7 +18,8 @@ def noise(q: Quotients, eps: float, repeated: Array) -> float:
     """Standard deviation of one evaluation of J near p: the largest of three estimates.
 
     - The second difference J(p + h) - 2 J(p) + J(p - h) is truncation error at large h and has the variance 6 sigma^2
-      at small h (Hamming 1973, chapter 6; More & Wild 2011). The least of its running medians is used.
+      at small h (Hamming 1973, chapter 6; More & Wild 2011). The least of its running medians tells the steps at which
+      it is noise; the median over these and all smaller ones is used, for the least of several is too small.
     - The standard deviation of `repeated` evaluations at p.
     - The rounding of J: the spacing of floating-point numbers, or, where some step leaves J unchanged, the least
       distance between two values seen, which is larger where J is printed or cancels.
@@ -28,10 +29,12 @@ def noise(q: Quotients, eps: float, repeated: Array) -> float:
         second = np.abs(q.off_forward * q.h) * np.sqrt(3.0)
     known = second[np.isfinite(second)]
     count = min(WINDOW, len(known))
-    medians = [np.median(known[k : k + count]) for k in range(len(known) - count + 1)] if count > 2 else [0.0]
+    medians = [float(np.median(known[k : k + count])) for k in range(len(known) - count + 1)] if count > 2 else []
+    noisy = known[: int(np.argmin(medians)) + count] if medians else np.zeros(1)
+    typical = max(min(medians, default=0.0), float(np.median(noisy)))
     scatter = float(np.std(repeated, ddof=1)) if len(repeated) > 1 else 0.0
     seen = np.concatenate([q.J_plus, q.J_minus, [q.J]])
     gaps = np.diff(np.unique(seen[np.isfinite(seen)]))
     unchanged = np.count_nonzero(seen == q.J) > 1  # J itself is one of them
     rounding = REPRESENTABLE * max(eps * abs(q.J), float(gaps.min()) if gaps.size and unchanged else 0.0)
-    return max(float(min(medians)) / (NORMAL * math.sqrt(6.0)), scatter, rounding)
+    return max(typical / (NORMAL * math.sqrt(6.0)), scatter, rounding)

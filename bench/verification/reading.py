@@ -23,6 +23,7 @@ RESOLVED = 1e-3  # largest relative uncertainty of a quotient that can judge a g
 NEARER = 0.1  # the same for smaller steps that contradict larger ones
 ZERO = 1e3 * float(np.finfo(np.float64).eps)  # a slope below this part of the change of J is rounding
 TINY = 1e-6  # relative jump of one-sided quotients that is not a kink
+CLEAR = 10.0  # noises of a quotient beyond which its error is truncation
 NATURAL = 1e-3  # steps from which on the change of J is one of natural size
 
 
@@ -84,6 +85,15 @@ class Reading:
         slopes = np.concatenate([self.quotients.s_plus, self.quotients.s_minus])
         known = slopes[np.isfinite(slopes)]
         return float(np.median(known)) if known.size else float("nan")
+
+    def truncation(self, h: float) -> float:
+        """The error of quotients at step h, were it c h^2 with the least c of smaller steps that are clear of noise."""
+        q = self.quotients
+        if self.level is None:
+            return float("inf")
+        error = np.abs(q.off - self.level.value)
+        clear = np.isfinite(error) & (error > CLEAR * self.noise / q.h) & (q.h <= h * (1.0 + 1e-9))
+        return float((error / q.h**2)[clear].min()) * h**2 if clear.any() else 0.0
 
     @property
     def quotient(self) -> float | None:

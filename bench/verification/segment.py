@@ -21,33 +21,44 @@ STAYS = 0.1  # part of what the plateau would make of the segment that the solve
 
 @dataclass(frozen=True)
 class Segment:
-    """|J(p + T v) - J(p) - integral of g . v|, the larger of T = +-LENGTH, and what the plateau predicts of it."""
+    """|J(p + T v) - J(p) - integral of g . v|, the larger of T = +-LENGTH, and what the plateau predicts of it.
+
+    at_p  whether the plateau is there at p alone: the slopes beside p tend to that of J, not to that of the gradient
+    """
 
     found: float
     predicted: float
+    at_p: bool = False
 
     @property
     def by_solver(self) -> bool:
-        """Whether the gradient is right over the segment, so that the plateau is of J at p."""
-        return self.found <= STAYS * self.predicted
+        """Whether the gradient is right over the segment and smooth at p, so that the plateau is of J at p."""
+        return self.found <= STAYS * self.predicted and not self.at_p
 
 
 def segment(seen: Examination, reading: Reading) -> Segment | None:
     """Two calls of J, four of the gradient; None where the segment leaves the bounds or a value is missing."""
     assert reading.level is not None
     v, subject = reading.quotients.line.v, seen.subject
+    if reading.truncation(LENGTH) > STAYS * abs(reading.level.value):
+        return None  # J bends too much on the way
     ends = [subject.p + T * v for T in (LENGTH, -LENGTH)]
     if seen.J.left() < len(ends) or not all(map(subject.inside, ends)):
         return None
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    found = []
+    found, at, slopes = [], [], []
     for T, end in zip((LENGTH, -LENGTH), ends, strict=True):
-        slopes = []
         for t in 0.5 * T * (1.0 + nodes):
             seen.J.account.gradients += 1
             try:
                 slopes.append(float(gradient_of(subject.moved(subject.p + t * v)).gradient @ v))
             except Unusable:
                 return None
-        found.append(abs(seen.J(end) - seen.J_0 - 0.5 * T * float(weights @ slopes)))
-    return Segment(max(found), LENGTH * abs(reading.level.value)) if np.isfinite(found).all() else None
+            at.append(t)
+        found.append(abs(seen.J(end) - seen.J_0 - 0.5 * T * float(weights @ slopes[-NODES:])))
+    if not np.isfinite(found).all():
+        return None
+    limit = float(np.polynomial.Polynomial.fit(at, slopes, len(at) - 1)(0.0))
+    value = reading.level.value
+    at_p = abs(limit - (reading.slope + value)) < abs(limit - reading.slope)
+    return Segment(max(found), LENGTH * abs(value), at_p)

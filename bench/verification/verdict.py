@@ -12,7 +12,7 @@ STANDS = 0.9  # of a plateau: it has not moved
 OTHERS = 3  # right components for every wrong one, so that the error is local
 CONTRAST = 100.0  # errors of the right components that those of the wrong ones exceed, where J cannot be tightened
 GROSS = 1e-2  # relative error above which no usual solver tolerance explains a plateau
-GROSS_COMPONENT = 0.1  # the same of one component, relative to itself
+GROSS_COMPONENT = 0.1  # the same of one component, relative to itself, whose error is gross beside the gradient's size
 UNSOUND = "Taylor"  # evidence on J and the gradient alone, which agreement must not contradict
 
 
@@ -52,6 +52,9 @@ def convicted(c: Check) -> bool:
         return True
     if not c.tightened:
         return not c.not_done and _gross(c)
+    apart = c.located.contrast >= CONTRAST
+    if apart and all(w.given == 0.0 for w in c.located.worst):
+        return True  # no solver drops a component entirely
     tested = c.factors_tested or any(t.moved for t in c.tightened)
     return not _moves(c) if tested else not c.not_done and _gross(c)
 
@@ -60,8 +63,13 @@ def certain(c: Check) -> bool:
     """Whether no solver and no mesh makes such an error: it is confined to few components, or alike elsewhere."""
     if c.compared is not None:
         return True
-    known = 1.0 if c.tightened or c.factors_tested else CONTRAST
-    return _local(c.located) and c.located is not None and c.located.contrast >= known
+    if c.located is None or not c.located.worst:
+        return False
+    apart = c.located.contrast >= CONTRAST
+    if apart and all(w.given == 0.0 for w in c.located.worst):
+        return True  # no solver drops a component entirely
+    tested = c.factors_tested or any(t.moved for t in c.tightened)
+    return _local(c.located) and (tested or (apart and min(w.off for w in c.located.worst) >= GROSS))
 
 
 def agreed(reading: Reading) -> bool:
@@ -101,7 +109,8 @@ def _moves(c: Check) -> bool:
 def _gross(c: Check) -> bool:
     """Whether the gradient is off by more than a loosely solved J explains."""
     whole = max((r.off for r in c.readings if r.says == "plateau" and r.quotients.line.whole), default=0.0)
-    worst = max((w.off for w in c.located.worst), default=0.0) if c.located is not None else 0.0
+    parts = () if c.located is None else c.located.worst
+    worst = max((w.off for w in parts if w.share >= GROSS), default=0.0)
     factor = None if c.located is None else c.located.factor
     return whole >= GROSS or worst >= GROSS_COMPONENT or (factor is not None and abs(factor - 1.0) >= GROSS)
 
