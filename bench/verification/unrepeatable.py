@@ -13,8 +13,8 @@ OBJECTIVE = 1e-3  # change of J(p) relative to |J(p)| and to its natural change;
 def unrepeatable(seen: Examination, reading: Reading | None) -> str | None:
     """What differs, and by how much; None where J and the gradient are the same again, or nearly.
 
-    A small change of J(p) matters where quotients of larger steps agree with the gradient: those of small steps then are
-    of a J that starts from its last state and stops at once.
+    A small change of J(p) matters where quotients of larger steps agree with the gradient: those of small steps are then
+    of a J that starts from its last state, and stops there.
     """
     said, J, found = [], abs(seen.J_0), seen.repeated
     size = max(seen.size, ZERO * max((r.change for r in seen.readings), default=0.0))

@@ -52,9 +52,6 @@ def convicted(c: Check) -> bool:
         return True
     if not c.tightened:
         return not c.not_done and _gross(c)
-    apart = c.located.contrast >= CONTRAST
-    if apart and all(w.given == 0.0 for w in c.located.worst):
-        return True  # no solver drops a component entirely
     tested = c.factors_tested or any(t.moved for t in c.tightened)
     return not _moves(c) if tested else not c.not_done and _gross(c)
 
