@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Software:  taichi 1.7.4 on a CPU, Python 3.11 (no release for Python 3.14)
+# Software:  taichi 1.7.4 on a CPU, Python 3.11
 # Behaviour: at a tie max and min give all of the slope to their second argument, so max(x, 0) and max(0, x) differ at
 #            0; the largest of equal entries is the last. clamp has the slope 1 at both bounds.
 # Output:    max(x, y) 0 1
