@@ -90,6 +90,21 @@ def jump_nearby(rng: Rng) -> Iterator[Box]:
 
 
 @family(KIND)
+def wall(rng: Rng) -> Iterator[Box]:
+    """Beyond p_1 the solver fails: a large number, or none."""
+    for name, value in (("1e20", 1e20), ("inf", np.inf), ("nan", np.nan)):
+        model = separable(rng)
+
+        def J(p: Array, model: Model = model, value: float = value) -> Array:
+            return model.J(p) if p[0].real <= model.p[0] else model.J(p) + value
+
+        behind = Model(J, model.g, model.p)
+        yield right(behind, KINK if name == "1e20" else RIGHT | KINK | OPEN, f"right-{name}", smooth=model.J)
+        fault = sign(behind, rng)
+        yield wrong(behind, fault, WRONG | KINK | OPEN, "combined", name=f"sign-{name}", smooth=model.J)
+
+
+@family(KIND)
 def one_point_only(rng: Rng) -> Iterator[Box]:
     """J(p) itself has another value than everything around it."""
     model = separable(rng)

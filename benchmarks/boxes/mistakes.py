@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from benchmarks.boxes.bases import base, separable
-from benchmarks.boxes.box import OPEN, RIGHT, WRONG, Box, Expect, Faulty, Model, family, right, wrong
-from benchmarks.boxes.faults import natural, one_scaled, scaled, weighty
+from benchmarks.boxes.box import OPEN, WRONG, Box, Faulty, Model, family, right, wrong
 from benchmarks.boxes.fits import kl_divergence
 from benchmarks.boxes.physics import conduction, laplacian, steady_heat
 from gradient_routes.problems.problem import Array
@@ -192,47 +191,6 @@ def picard_adjoint(rng: Rng) -> Iterator[Box]:
     )
 
 
-def recursion(rng: Rng, m: int) -> tuple[Callable[[Array], Array], Callable[[Array, int, int], Array], Array]:
-    """x_k = x_(k-1) + dt (sin(x_(k-1)) + p_1 - p_2 x_(k-1)), J = x_m^2; the adjoint of its last `last` steps, which
-    takes x from `shift` steps later.
-    """
-    dt = 2.0 / m
-
-    def path(p: Array) -> list[Array]:
-        x = [0.3 + 0 * p[0]]
-        for _ in range(m):
-            x.append(x[-1] + dt * (np.sin(x[-1]) + p[0] - p[1] * x[-1]))
-        return x
-
-    def g(p: Array, last: int, shift: int) -> Array:
-        x, out = path(p), np.zeros(2)
-        lam = 2 * x[-1]
-        for k in range(m - 1, m - 1 - last, -1):
-            y = x[min(k + shift, m)]
-            out += lam * dt * np.array([1.0, -y])
-            lam = lam * (1 + dt * (np.cos(y) - p[1]))
-        return out
-
-    return lambda p: path(p)[-1] ** 2, g, rng.uniform(0.5, 1.5, 2)
-
-
-@family(KIND)
-def truncated_in_time(rng: Rng) -> Iterator[Box]:
-    """The adjoint stops after a third of the steps."""
-    J, g, p = recursion(rng, 30)
-    yield from mistaken(J, lambda q: g(q, 30, 0), lambda q: g(q, 10, 0), p)
-
-
-@family(KIND)
-def adjoint_of_another_scheme(rng: Rng) -> Iterator[Box]:
-    """Optimize then discretize: the adjoint takes the state one step late, an error of order dt."""
-    for m, expect in ((8, WRONG | OPEN), (40, WRONG | OPEN)):
-        J, g, p = recursion(rng, m)
-        model = Model(J, lambda q, g=g, m=m: g(q, m, 0), p)
-        yield right(model, name=f"right-{m}")
-        yield wrong(model, Faulty(f"late-{m}", lambda q, g=g, m=m: g(q, m, 1)), expect, error=1e-4)
-
-
 @family(KIND)
 def load_that_follows(rng: Rng) -> Iterator[Box]:
     """f depends on p; only the stiffness is differentiated."""
@@ -295,77 +253,3 @@ def made_for_an_optimizer(rng: Rng) -> Iterator[Box]:
         model = separable(rng)
         size = float(np.linalg.norm(model.g(model.p)))
         yield wrong(model, Faulty(name, lambda p, m=model, c=change, s=size: c(m.g(p), p, s)))
-
-
-def tiny(name: str, make: Callable[[Model, Rng, float], Faulty], sizes: tuple[float, ...], expect: Expect) -> None:
-    """A family of errors that are small, of several sizes."""
-
-    def boxes(rng: Rng) -> Iterator[Box]:
-        for size in sizes:
-            model = base(rng)
-            while len(model.p) < 6:
-                model = base(rng)
-            fault = make(model, rng, size)
-            gross = frozenset() if size >= 0.1 else expect
-            yield wrong(model, fault, WRONG | gross, name=f"{fault.name}-{size:g}", error=0.1 * size)
-
-    family(KIND)(_named(boxes, name))
-
-
-def _named(boxes: Callable[[Rng], Iterator[Box]], name: str) -> Callable[[Rng], Iterator[Box]]:
-    boxes.__name__ = name
-    return boxes
-
-
-def offset_by(model: Model, rng: Rng, size: float) -> Faulty:
-    w = natural(model)
-    c = size * float(np.linalg.norm(model.g(model.p) * w)) / np.sqrt(len(w)) / w
-    return Faulty("offset", lambda p: model.g(p) + c)
-
-
-def wavy(model: Model, rng: Rng, size: float) -> Faulty:
-    a, b = rng.uniform(1.0, 3.0, (2, len(model.p)))
-    return Faulty("wavy", lambda p: model.g(p) * (1 + size * np.sin(a * p + b)))
-
-
-def half_of_them(model: Model, rng: Rng, size: float) -> Faulty:
-    group = np.arange(len(model.p)) % 2 == 0
-    wrong_ones = frozenset(np.flatnonzero(group).tolist())
-    return Faulty("group", lambda p: np.where(group, 1 + size, 1.0) * model.g(p), wrong_ones)
-
-
-EXACT = frozenset[str]()  # nothing but wrong-gradient is right
-tiny("common_factor", lambda m, rng, s: scaled(m, 1 + s, "factor"), (1e-4, 1e-3, 1e-2, 0.1), EXACT)
-tiny("one_component", lambda m, rng, s: one_scaled(m, weighty(m, rng), 1 + s, "component"), (1e-3, 1e-2, 0.1), EXACT)
-tiny("constant_offset", offset_by, (1e-3, 1e-2, 0.1), EXACT)
-tiny("every_second_component", half_of_them, (1e-3, 1e-2, 0.1), EXACT)
-tiny("generic_error", wavy, (1e-4, 1e-3, 1e-2, 0.2), OPEN)
-
-
-@family(KIND)
-def few_digits(rng: Rng) -> Iterator[Box]:
-    """The gradient in float32 is right to its precision; rounded to two digits it is not."""
-    for k in range(2):
-        model = base(rng)
-        single = lambda p, m=model: m.g(p).astype("f4")  # noqa: E731
-        yield right(model, name=f"right-{k + 1}", gradient=single, error=1e-6)
-    model = separable(rng)
-    yield wrong(model, Faulty("two-digits", lambda p: np.round(model.g(p), 1)), WRONG | OPEN, error=1e-3)
-
-
-@family(KIND)
-def differences(rng: Rng) -> Iterator[Box]:
-    """Gradients by finite differences: central ones are right, one-sided ones of a large step are not."""
-
-    def by_differences(model: Model, h: float, central: bool) -> Callable[[Array], Array]:
-        def g(p: Array) -> Array:
-            E = h * np.eye(len(p))
-            back = np.array([model.J(p - e) for e in E]) if central else model.J(p)
-            return (np.array([model.J(p + e) for e in E]) - back) / (h * (1 + central))
-
-        return g
-
-    model = separable(rng)
-    yield right(model, RIGHT, gradient=by_differences(model, 1e-5, True), error=1e-8)
-    yield wrong(model, Faulty("one-sided-0.01", by_differences(model, 1e-2, False)), WRONG | OPEN, error=1e-4)
-    yield wrong(model, Faulty("one-sided-0.5", by_differences(model, 0.5, False)), WRONG | OPEN, error=1e-2)

@@ -226,3 +226,26 @@ def held_by_bounds(rng: Rng) -> Iterator[Box]:
     yield right(held)
     yield wrong(held, sign(held, rng))
     yield wrong(held, one_scaled(held, 1, 2.0, "component"))
+
+
+@family(KIND)
+def without_values(rng: Rng) -> Iterator[Box]:
+    """J or its gradient has no value at p, or J has none anywhere else."""
+    model = separable(rng)
+    p, nan = model.p, float("nan")
+
+    def fails(q: Array) -> float:
+        raise ArithmeticError("the matrix is singular")
+
+    def alone(q: Array) -> float:
+        return float(model.J(q)) if (q == p).all() else nan
+
+    about = {"start": p, "truth": "right", "expect": OPEN, "wrong": frozenset(), "gradient": model.g}
+    yield Box("right-nan", objective=lambda q: nan, **about)
+    yield Box("right-inf", objective=lambda q: float("inf"), **about)
+    yield Box("right-raises", objective=fails, **about)
+    yield Box("right-alone", objective=alone, **about)
+    J = lambda q: float(model.J(q))  # noqa: E731
+    yield Box("sign-alone", p, alone, lambda q: -model.g(q), "wrong", OPEN | WRONG, knowable=False)
+    yield Box("gradient-nan", p, J, lambda q: np.where(np.arange(len(q)) == 0, nan, model.g(q)), "wrong", WRONG)
+    yield Box("gradient-raises", p, J, fails, "wrong", OPEN | WRONG, knowable=False)
