@@ -186,15 +186,24 @@ def show_boxes(out: Console, seeds: int, only: str, jobs: int, json: Path | None
     return not any(judged.fault == "acquitted" for judged in found)
 
 
+def positive(text: str) -> int:
+    """A whole number of at least 1. Raises ArgumentTypeError."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} - give a whole number, 1 at least")
+    return int(text)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--matrix", action="store_true", help="only routes on problems")
     parser.add_argument("--boxes", action="store_true", help="only black boxes")
-    parser.add_argument("--seeds", type=int, default=5, help="of each family of boxes")
+    parser.add_argument("--seeds", type=positive, default=5, help="of each family of boxes")
     parser.add_argument("--only", default="", metavar="TEXT", help="boxes whose id FAMILY/BOX@SEED contains TEXT")
-    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--jobs", type=positive, default=2, help="processes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="every check of a box")
     given = parser.parse_args()
+    if given.json is not None and not given.json.parent.is_dir():
+        parser.error(f"--json {given.json}: there is no folder {given.json.parent} - name one that exists")
     out, sound = console(), True
     if given.matrix or not given.boxes:
         sound &= show_matrix(out)

@@ -91,6 +91,22 @@ def test_the_exit_code_is_that_of_acquittals(verdict: str, code: int, monkeypatc
     assert ended.value.code == code
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--seeds", "0"], "0 - give a whole number, 1 at least"),
+        (["--jobs", "x"], "x - give a whole number, 1 at least"),
+        (["--json", "no-such-folder/rows.json"], "there is no folder no-such-folder"),
+    ],
+)
+def test_bad_options_are_refused(arguments: list[str], said: str, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["confusion", "--boxes", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        confusion.main()
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err
+
+
 def test_a_name_that_no_box_has_is_refused(monkeypatch) -> None:
     monkeypatch.setattr(sys, "argv", ["confusion", "--boxes", "--only", "no-such-box"])
     with pytest.raises(SystemExit, match="no box contains 'no-such-box'"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +16,13 @@ Rng = np.random.Generator
 KIND = "jumps and corners"
 
 
-def plus(model: Model, extra: Callable[[Array], Array], slope: Callable[[Array], Array] | None = None) -> Model:
+def plus(model: Model, extra: Callable[[Array], Any], slope: Callable[[Array], Array] | None = None) -> Model:
     """J + extra(p), and g + slope(p); no slope where extra is piecewise constant."""
     g = model.g if slope is None else lambda p: model.g(p) + slope(p)
     return Model(lambda p: model.J(p) + extra(p), g, model.p, model.options)
 
 
-def first(value: Callable[[Array], Array]) -> Callable[[Array], Array]:
+def first(value: Callable[[Array], Any]) -> Callable[[Array], Array]:
     """A gradient that is value(p) in the first component and 0 elsewhere."""
 
     def slope(p: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ KIND = "smooth mistakes"
 
 
 def mistaken(
-    J: Callable[[Array], Array], g: Callable[[Array], Array], bad: Callable[[Array], Array], p: Array
+    J: Callable[[Array], Any], g: Callable[[Array], Array], bad: Callable[[Array], Array], p: Array
 ) -> Iterator[Box]:
     """The right gradient and the mistaken one."""
     model = Model(J, g, p)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.boxes.bases import base
-from benchmarks.boxes.box import OPEN, RIGHT, STATE, WRONG, Box, Model, family, right, wrong
+from benchmarks.boxes.box import OPEN, STATE, WRONG, Box, Model, family, right, wrong
 from benchmarks.boxes.faults import sign
 from gradient_routes.problems.problem import Array
 
@@ -93,8 +93,7 @@ def races(rng: Rng) -> Iterator[Box]:
             g[i] *= 0.5 if calls % every == 0 else 1.0
             return g
 
-        more = {} if every == 2 else {"expect": UNSTEADY | RIGHT}
-        yield stateful(f"every-{every}", model, Counting(model, altered), wrong=frozenset({i}), **more)
+        yield stateful(f"every-{every}", model, Counting(model, altered), wrong=frozenset({i}))
     model, dice = base(rng), np.random.default_rng(int(rng.integers(2**32)))
     yield stateful("scattered", model, Counting(model, lambda g, calls: g * (1 + 0.1 * dice.standard_normal(len(g)))))
 
