@@ -13,7 +13,7 @@ OBJECTIVE = 1e-3  # change of J(p) relative to |J(p)| and to its natural change;
 def unrepeatable(seen: Examination, reading: Reading | None) -> str | None:
     """What differs, and by how much; None where J and the gradient are the same again, or nearly.
 
-    A small change of J(p) matters where quotients of larger steps agree with the gradient: those of small steps are then
+    A small change of J(p) matters where larger steps agree with the gradient: the quotients of small steps are then
     of a J that starts from its last state, and stops there.
     """
     said, J, found = [], abs(seen.J_0), seen.repeated
