@@ -23,6 +23,8 @@ def check(
     names: Sequence[str] | None = None,
     tighten: Callable[[float], Any] | None = None,
     active_set: Callable[..., Any] | None = None,
+    scaled: Callable[[float], Any] | None = None,
+    fresh: Callable[..., Any] | None = None,
     budget: float = 240,
     seed: int = 0,
     accept: float = 0.0,
@@ -34,11 +36,14 @@ def check(
                value_and_gradient(p), and start, and whatever of the keywords below it offers as attributes
     gradient   dJ/dp(p) -> (n_p,)
     start      p (n_p,) to check at
-    scale      natural changes (n_p,), > 0 [|p_i|, for zeros the median of the others or 1]
-    bounds     (lower, upper), numbers or arrays (n_p,): no point outside is asked for
+    scale      natural changes (n_p,), > 0 [|p_i|, for zeros the median of the others, or what J responds to]
+    bounds     (lower, upper), numbers or arrays (n_p,), a list of n_p pairs, or scipy.optimize.Bounds: no point
+               outside is asked for; a parameter with equal bounds is held
     names      of the parameters, n_p of them
     tighten    tighten(factor) -> (objective, gradient), or such an object, the solver's tolerance times factor < 1
     active_set active_set(p) -> a hashable, which smooth branch of J holds
+    scaled     scaled(factor) -> (objective, gradient), or such an object, of J times factor
+    fresh      fresh(p) -> J(p) computed anew, where objective and gradient come out of one recording
     budget     objective calls at most
     seed       of the random directions
     accept     relative error of the gradient that is good enough [1e-7]
@@ -61,6 +66,7 @@ def check(
     plan = Plan(budget=budget, seed=seed)
     if gradient is None:
         given = {"scale": scale, "bounds": bounds, "names": names, "tighten": tighten, "active_set": active_set}
+        given |= {"scaled": scaled, "fresh": fresh}
         own = [key for key, value in given.items() if value is not None]
         if own:
             raise InputError(f"check: an object brings its own {own[0]} - make it an attribute")
@@ -77,6 +83,8 @@ def check(
         names=names,
         tighten=tighten,
         active_set=active_set,
+        scaled=scaled,
+        fresh=fresh,
     )
     return check_subject(subject, plan, accept)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from gradient_routes.bench.verification import messages
 from gradient_routes.bench.verification.diagnosis import diagnose
-from gradient_routes.bench.verification.examine import Examination
+from gradient_routes.bench.verification.examine import Examination, NoValue
 from gradient_routes.bench.verification.guarded import Account, Guarded, Unusable
 from gradient_routes.bench.verification.lines import directions
 from gradient_routes.bench.verification.plan import Plan
@@ -47,7 +47,7 @@ def _checked(subject: Subject, plan: Plan, J: Guarded, accepted: float) -> Check
         seen = Examination.of(subject, plan, J, accepted)
     except Unusable as failure:
         return messages.on_unusable(subject.name, failure)
-    if not np.isfinite(seen.J_0):
+    except NoValue:
         return messages.on_no_value(subject.name, J)
     seen.run()
     found = judged(seen)

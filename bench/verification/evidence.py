@@ -9,13 +9,17 @@ import numpy as np
 from gradient_routes.bench.verification.curve import slope
 from gradient_routes.bench.verification.examine import Examination
 from gradient_routes.bench.verification.finding import Finding
+from gradient_routes.bench.verification.guarded import FOREIGN, gradient_of, one_line
 from gradient_routes.bench.verification.lines import directions
 from gradient_routes.bench.verification.plateau import DIFFERENT
 from gradient_routes.bench.verification.reading import ZERO
+from gradient_routes.bench.verification.result import FRESH_J
 from gradient_routes.problems.errors import RoutesError
 
 COUNT = 3  # random directions of complex steps
 COMPLEX = 1e-9  # relative error left by complex steps and linearized solves of tolerance 1e-12
+FRESH = 1e-6  # relative difference of two ways to compute J
+TIMES, SCALED = 1e9, 1e-4  # by which J is scaled, and the relative difference of gradients that its solver may leave
 CLEAR = 100.0  # noises that a remainder has to exceed
 LARGEST = 0.1  # step below which the remainder is dominated by one power of h
 SECOND = 2
@@ -28,6 +32,8 @@ def evidence(seen: Examination) -> Iterator[Finding]:
     """All that the subject allows. It explains a verdict; agreement is decided by difference quotients."""
     yield from taylor(seen)
     yield from complex_steps(seen)
+    yield from fresh_value(seen)
+    yield from scaled_gradient(seen)
     if seen.subject.explain is not None:
         yield from seen.subject.explain(seen.gradient)
 
@@ -70,3 +76,33 @@ def complex_steps(seen: Examination) -> Iterator[Finding]:
     scale = size if size > ZERO * change else change  # at a minimum slopes are rounding
     off = float(np.linalg.norm(V.T @ seen.gradient - exact)) / (scale or 1.0)
     yield Finding("complex step", off, max(COMPLEX, subject.accuracy), f"{COUNT} directions")
+
+
+def fresh_value(seen: Examination) -> Iterator[Finding]:
+    """J at a second point, by the objective and computed anew: a recording may replay what held at p only."""
+    subject, q = seen.subject, seen.elsewhere
+    if subject.fresh is None or q is None or seen.J.left() < 2:
+        return
+    value, anew = seen.J(q), seen.J.sharing(subject.fresh)(q)
+    off = abs(value - anew) / (max(abs(value), abs(anew), abs(value - seen.J_0)) or 1.0)
+    limit = max(FRESH, CLEAR * seen.readings[0].noise / (abs(anew) or 1.0))
+    says = f"{value:.10g} and {anew:.10g} at a second point"
+    culprit = None if not off > limit else "the recording: it gives another J at a second point than J computed anew"
+    yield Finding(FRESH_J, off, limit, says, culprit)
+
+
+def scaled_gradient(seen: Examination) -> Iterator[Finding]:
+    """The gradient of J times 1e9, over 1e9: an absolute tolerance inside a linear solve shows so."""
+    if seen.subject.scaled is None:
+        return
+    w, g = seen.subject.natural, seen.gradient
+    try:
+        seen.J.account.gradients += 1
+        other = gradient_of(seen.subject.scaled(TIMES)).gradient / TIMES
+    except FOREIGN as failure:
+        yield Finding("gradient of J x 1e9", float("nan"), SCALED, one_line(failure))
+        return
+    size = max(float(np.linalg.norm(g * w)), float(np.linalg.norm(other * w)))
+    off = float(np.linalg.norm((other - g) * w)) / (size or 1.0)
+    culprit = None if off <= SCALED else "an absolute tolerance: the gradient does not grow with J"
+    yield Finding("gradient of J x 1e9 against 1e9 times the gradient", off, SCALED, culprit=culprit)

@@ -29,6 +29,10 @@ MACRO = 1e-2  # step at which treads are looked for where no range of steps sugg
 TREADS = 10.0  # noises of J that are its treads rather than chance
 
 
+class NoValue(Exception):
+    """J has no value at p."""
+
+
 @dataclass
 class Examination:
     """A subject, its gradient, its objective and the readings made so far.
@@ -51,8 +55,10 @@ class Examination:
 
     @classmethod
     def of(cls, subject: Subject, plan: Plan, J: Guarded, accepted: float = 0.0) -> Examination:
-        """Ask for J and its gradient repeatedly, find the scales that are unknown. Raises Unusable."""
+        """Ask for J and its gradient repeatedly, find the scales that are unknown. Raises Unusable, NoValue."""
         values = [J(subject.p), J(subject.p)]
+        if not np.isfinite(values).any():
+            raise NoValue
         subject = with_scales(subject, J, values[0])
         q = second_point(subject, J, plan.seed) if np.isfinite(values).all() else None
         found = repeated(subject, J, values, q)

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gradient_routes.bench.verification.guarded import FOREIGN
+from gradient_routes.bench.verification.guarded import FOREIGN, detached
+from gradient_routes.bench.verification.held import without
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, default_label
 
-Bounds = tuple[Any, Any]
+Bounds = Any  # (lower, upper), one pair a parameter, or scipy.optimize.Bounds
 DECADES = 1e3  # ratio of magnitudes that tell the scale of a parameter that starts at 0
-OPTIONAL = ("scale", "bounds", "names", "tighten", "active_set")
+OPTIONAL = ("scale", "bounds", "names", "tighten", "active_set", "scaled", "fresh")
 
 
 def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
     """A subject from an object with objective(p) and gradient(p), or value_and_gradient(p), and start (n_p,).
 
-    Optional attributes: scale, bounds (lower, upper), names, tighten(factor), active_set(p). `start` overrides the
-    object's. A class, or a function that returns the object, is called first. Raises InputError.
+    Optional attributes: scale, bounds, names, tighten(factor), active_set(p), scaled(factor), fresh(p). `start`
+    overrides the object's. A class, or a function that returns the object, is called first. Raises InputError.
     """
     try:
         made = _made(thing, name)
@@ -65,10 +66,13 @@ def subject(
     names: Sequence[str] | None = None,
     tighten: Callable[[float], Any] | None = None,
     active_set: Callable[[Array], Any] | None = None,
+    scaled: Callable[[float], Any] | None = None,
+    fresh: Callable[[Array], Any] | None = None,
 ) -> Subject:
     """A subject from plain functions. Raises InputError.
 
-    tighten(factor) returns (objective, gradient), or an object that has them; everything else stays.
+    tighten(factor) and scaled(factor) return (objective, gradient), or an object that has them; everything else stays.
+    Parameters whose bounds are equal are held: they are left out, and a note says so.
     """
     p = _vector(start, None, "start")
     n_p = len(p)
@@ -76,30 +80,37 @@ def subject(
     s = _natural_scale(p) if scale is None else _vector(scale, n_p, "scale")
     wrong = (s <= 0) | np.isinf(s)
     _all(~wrong, lambda i: f"scale[{i}] = {s[i]:g} - give scales > 0 and finite")
-    lower, upper = _bounds(bounds, n_p)
+    lower, upper = _bounds(bounds, p)
     spans = [f"{a:g} to {b:g}" for a, b in zip(lower, upper, strict=True)]
-    _all(lower < upper, lambda i: f"bounds[{i}] = {spans[i]} - give (lower, upper), lower < upper")
+    _all(lower <= upper, lambda i: f"bounds[{i}] = {spans[i]} - give (lower, upper), lower <= upper")
     inside = (p >= lower) & (p <= upper)
     _all(inside, lambda i: f"start[{i}] = {p[i]:g} is outside its bounds {spans[i]} - start inside")
     label = default_label if names is None else _labels(names, n_p)
     made = Subject(name, objective, gradient, p, s, lower, upper, label=label)
 
-    def tightened(factor: float) -> Subject:
-        assert tighten is not None
-        other = tighten(factor)
-        J, g = other if isinstance(other, tuple) else functions_of(_made(other, "tightened"), "tightened")
-        return replace(made, objective=J, gradient=g)
+    def other(make: Callable[[float], Any], what: str) -> Callable[[float], Subject]:
+        def made_by(factor: float) -> Subject:
+            given = make(factor)
+            J, g = given if isinstance(given, tuple) else functions_of(_made(given, what), what)
+            return replace(made, objective=J, gradient=g)
 
-    return replace(
+        return made_by
+
+    made_whole = replace(
         made,
-        tighten=tightened if callable(tighten) else None,
+        tighten=other(tighten, "tightened") if callable(tighten) else None,
+        scaled=other(scaled, "scaled") if callable(scaled) else None,
         active_set=active_set if callable(active_set) else None,
+        fresh=fresh if callable(fresh) else None,
     )
+    held = lower == upper
+    _all([not held.all()], lambda i: "every parameter is held by its bounds - free one")
+    return without(made_whole, held) if held.any() else made_whole
 
 
-def _all(holds: Array, otherwise: Callable[[int], str]) -> None:
+def _all(holds: Any, otherwise: Callable[[int], str]) -> None:
     """Raises InputError for the first component that does not."""
-    wrong = np.flatnonzero(~holds)
+    wrong = np.flatnonzero(~np.asarray(holds, bool))
     if wrong.size:
         raise InputError(f"check: {otherwise(int(wrong[0]))}")
 
@@ -119,14 +130,21 @@ def _natural_scale(p: Array) -> Array:
 
 def _vector(values: Any, n_p: int | None, what: str) -> Array:
     """A float64 copy (n_p,) of what a user gave. Raises InputError."""
+    if isinstance(values, Mapping):
+        raise InputError(f"check: {what} is a {type(values).__name__} - give one array, and take it apart in J")
     try:
-        array = np.array(values, dtype=np.float64)
+        array = np.array(detached(values))
+        if np.iscomplexobj(array):
+            raise InputError(f"check: {what} is complex - give real and imaginary parts as parameters of their own")
+        array = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"check: {what} is no array of real numbers ({error}) - give one of length n_p") from error
     if array.ndim == 0 and n_p is not None:
         array = np.full(n_p, float(array))
+    if n_p is not None and array.shape in ((n_p, 1), (1, n_p)):
+        array = array.reshape(n_p)
     if array.ndim != 1 or array.size == 0 or (n_p is not None and array.size != n_p):
-        wanted = "a vector" if n_p is None else f"{n_p} of them"
+        wanted = "a vector (n_p,): ravel it, and reshape p in J" if n_p is None else f"{n_p} of them"
         raise InputError(f"check: {what} has the shape {array.shape} - give {wanted}")
     _all(~np.isnan(array), lambda i: f"{what}[{i}] is NaN - give numbers")
     return array
@@ -142,16 +160,36 @@ def _labels(names: Any, n_p: int) -> Callable[[int], str]:
     return lambda i: given[i]
 
 
-def _bounds(bounds: Bounds | None, n_p: int) -> tuple[Array, Array]:
-    """lower and upper (n_p,) from a pair of numbers or arrays, or from SciPy's list of pairs; None is no bound."""
+def _bounds(bounds: Bounds | None, p: Array) -> tuple[Array, Array]:
+    """lower and upper (n_p,) from a pair of numbers or arrays, from SciPy's list of pairs, or from its Bounds.
+
+    None is no bound. Two pairs of two numbers can be both: the reading that p is inside of counts, where it is one.
+    """
+    n_p = len(p)
+    if bounds is None:
+        return _ends([None, None], n_p)
+    if hasattr(bounds, "lb") and hasattr(bounds, "ub"):
+        return _ends([bounds.lb, bounds.ub], n_p)
     try:
-        pair: list[Any] = [None, None] if bounds is None else list(bounds)
+        pair: list[Any] = list(bounds)
     except TypeError:
         pair = []
-    if len(pair) == n_p != 2 and all(np.size(b) == 2 for b in pair):
-        pair = [[b[k] for b in pair] for k in (0, 1)]
-    if len(pair) != 2:
+    readings = [pair] if len(pair) == 2 else []
+    if len(pair) == n_p and all(np.size(b) == 2 and not isinstance(b, np.ndarray) for b in pair):
+        readings.append([[b[k] for b in pair] for k in (0, 1)])
+    if not readings:
         raise InputError(f"check: bounds={bounds!r} - give (lower, upper), numbers or arrays, or one pair a parameter")
+    found = [_ends(reading, n_p) for reading in readings]
+    holding = [(lower, upper) for lower, upper in found if ((lower <= p) & (p <= upper)).all()] or found[-1:]
+    if not np.array_equal(holding[0], holding[-1]):
+        raise InputError(
+            f"check: bounds={bounds!r} can be read as (lower, upper) or as a pair for each parameter"
+            " - give scipy.optimize.Bounds(lower, upper)"
+        )
+    return holding[0]
+
+
+def _ends(pair: Sequence[Any], n_p: int) -> tuple[Array, Array]:
     ends = [_without_none(end, limit) for end, limit in zip(pair, (-np.inf, np.inf), strict=True)]
     lower, upper = (_vector(end, n_p, f"bounds[{k}]") for k, end in enumerate(ends))
     return lower, upper

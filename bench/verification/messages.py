@@ -40,6 +40,10 @@ def explained(check: Check, seen: Examination) -> Check:
         assert check.unrepeatable is not None
         todo = "start every call from the same state, with buffers of its own, whatever was asked for before"
         return replace(check, says=check.unrepeatable, todo=todo, culprit="a state kept between calls")
+    if check.recorded is not None:
+        says = f"the gradient may agree with the recorded J, which is another one: {check.recorded.says}"
+        todo = "record J where the gradient is asked for, every branch and iteration of it anew"
+        return replace(check, says=says, todo=todo, culprit=check.recorded.culprit)
     if reading is None:
         says = "no line has three steps at which J is finite"
         return replace(check, says=says, todo="make J computable near p, or correct its bounds")

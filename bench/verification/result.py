@@ -27,6 +27,7 @@ Verdict = Literal[
 ]
 EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1, "unrepeatable": 1}
 INCONCLUSIVE = 3
+FRESH_J = "J against fresh J"
 SHRINKS = 0.6  # order in the mesh size from which on a plateau is one of the discretization
 STAYS, SEVERAL = 0.3, 3  # order up to which it is not, on so many meshes
 MEANING: dict[Verdict, str] = {
@@ -146,6 +147,11 @@ class Check:
     def proof(self) -> Finding | None:
         """The first finding that proves a part of the gradient wrong."""
         return next((f for f in self.findings if f.culprit is not None), None)
+
+    @property
+    def recorded(self) -> Finding | None:
+        """The finding that J is not what its author computes anew, whatever the gradient agrees with."""
+        return next((f for f in self.findings if f.name == FRESH_J and f.sound is False), None)
 
     @property
     def moves(self) -> bool:

@@ -20,6 +20,8 @@ def verdict(c: Check) -> Verdict:
     """What the deciding line says, and on a plateau what explains it."""
     if c.unrepeatable and not solver_explains(c):
         return "unrepeatable"
+    if c.recorded is not None:
+        return "wrong-gradient"
     if c.deciding is None:
         return "undetermined"
     if c.deciding.says == "kink":
