@@ -21,6 +21,7 @@ from gradient_routes.problems.errors import InputError
 
 NAME = "at a second point"
 STATIONARY = "J is stationary at p, where a gradient of zero passes: judged at a point 5 % away"
+SAME = "the gradient is that at p: it does not change with p"
 DIFFERS = "at p the gradient agrees with differences; at a point 5 % away it does not"
 
 
@@ -79,6 +80,9 @@ def _at_a_second_point(seen: Examination, found: Check) -> Check:
     other.elsewhere = seen.subject.p
     other.readings.append(seen.readings[0])  # its noise: few steps show none
     reading = other.read(line, h)
+    if reading.says == "plateau" and np.array_equal(other.gradient, seen.gradient):
+        there = replace(found, verdict="wrong-gradient", deciding=reading, elsewhere=reading, compared=SAME)
+        return replace(messages.explained(there, seen), moved=DIFFERS)
     if seen.stationary or reading.says == "plateau":
         other.readings.clear()
         other.run()

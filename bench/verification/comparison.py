@@ -26,6 +26,7 @@ ALIKE = 0.05  # relative scatter of one factor, less 1
 SAME = 0.02  # change of one difference, relative to that of the slopes
 CLEAR = 30.0  # uncertainties by which a slope, or a difference of slopes, is known
 FEW = 3  # lines, those at other points included, whose factor is compared
+LEAST = 1e-3  # factor, less 1, of so few lines at p: a fixed number of steps may make a smaller one
 FARTHER = 4.0  # times as far as the second point
 FEWEST = 2  # exact components, and others off by one factor
 
@@ -75,7 +76,8 @@ def compared(seen: Examination, reading: Reading, located: Located) -> str | Non
             return said
         pairs += there
     factor = _factor([*here, *pairs])
-    if factor is not None and pairs and len(pairs) + len(here) >= FEW:
+    least = LEAST if len(here) < FEW else 0.0
+    if factor is not None and pairs and len(pairs) + len(here) >= FEW and abs(factor - 1.0) >= least:
         return f"slopes of J and of the gradient have the ratio {factor:.6g} on every line, also at a second point"
     return _in_part(seen, [*here, *pairs], _pair(reading))
 
@@ -160,14 +162,14 @@ def _factor(pairs: Sequence[Pair]) -> float | None:
 
 def _constant(both: Sequence[tuple[Pair, Pair]]) -> bool:
     """Whether the differences are the same at both points, while the slopes are not."""
-    pairs = [(b, a) for b, a in both if abs(b.off) > CLEAR * b.uncertainty]
-    if len(pairs) < FEWEST:
-        return False
-    for b, a in pairs:
-        moved = abs(a.quotient / b.quotient - 1.0) if b.quotient else 1.0
-        if moved < SAME or abs(a.off / b.off - 1.0) > SAME * moved:
+    moved = 0
+    for b, a in both:
+        change = abs(a.quotient - b.quotient) / (abs(b.quotient) or 1.0)
+        known = DIFFERENT * (a.uncertainty + b.uncertainty)
+        if abs(a.off - b.off) > max(SAME * min(change, 1.0) * abs(b.off), known):
             return False
-    return True
+        moved += change >= SAME and abs(b.off) > CLEAR * b.uncertainty
+    return moved >= FEWEST
 
 
 def _in_part(seen: Examination, pairs: Sequence[Pair], like: Pair | None) -> str | None:

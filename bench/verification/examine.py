@@ -108,7 +108,8 @@ class Examination:
         for k, line in enumerate(self.lines()):
             if k == 1:
                 self._test_memory()
-                self._test_treads()
+            if k == 1 or (self.readings and self.readings[-1].contradicted and not self.treads):
+                self._test_treads(self.readings[-1])
             best = self.readings[0].level if self.readings else None
             if self.plan.everywhere or k == 0 or best is None:
                 self.readings.append(self.read(line, self.plan.steps))
@@ -129,9 +130,8 @@ class Examination:
         self.remembers = max(self.remembers, abs(value - self.J_0))
         self._read_again()
 
-    def _test_treads(self) -> None:
+    def _test_treads(self, reading: Reading) -> None:
         """Where ranges of steps contradict each other, or the gradient: are the small ones within a tread of J?"""
-        reading = self.readings[0]
         if reading.level is None or not (reading.says == "plateau" or reading.contradicted):
             return
         other = min(reading.contradicted, key=lambda a: a.uncertainty, default=None)
@@ -149,14 +149,15 @@ class Examination:
 
     def _extended(self, reading: Reading) -> Reading:
         """With as many steps again, on the better side, where few steps leave a component or the line undecided."""
-        decided = reading.says != "noise" and (reading.index is None or reading.own_scale)
+        frozen = reading.sampled and not reading.moves and bool(reading.slope)
+        decided = not frozen and reading.says != "noise" and (reading.index is None or reading.own_scale)
         q = reading.quotients
-        if decided or reading.says in ("plateau", "nothing") or not q.two_sided or not reading.slope:
+        if decided or (reading.says in ("plateau", "nothing") and not frozen) or not q.two_sided or not reading.slope:
             return reading
         variation = np.abs(np.diff(q.off_central))
         below = np.nansum(variation[: len(variation) // 2]) < np.nansum(variation[len(variation) // 2 :])
         steps = self.plan.steps
-        more = steps[steps < q.h[0]][-len(q.h) :] if below else steps[steps > q.h[-1]][: len(q.h)]
+        more = steps[steps < q.h[0]][-len(q.h) :] if below and not frozen else steps[steps > q.h[-1]][: len(q.h)]
         if self.J.left() < 2 * len(more):
             return reading
         return self._reading(q.joined(quotients(self.J, self.J_0, self.subject, self.gradient, q.line, more)))

@@ -19,8 +19,9 @@ from gradient_routes.problems.problem import Array
 
 MOST = 4  # wrong components searched for, beyond those found on the lines of the plan
 AROUND = 10.0 ** np.array([-0.5, 0.0, 0.5])  # steps about the best one, to measure a component that was found
+SMALL, BESIDE = 1e-2, 1e-3  # an error that small of a component, and beside the largest, is the solver's rest
 SEVERAL = 3  # components of the plan, all wrong: the search among the others ends
-ALIKE = 0.02  # relative scatter of factors that are the same factor
+ALIKE, CLOSE = 0.02, 0.1  # scatter of factors that are one, relative to it, and to its distance from 1
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ class Located:
             return None
         values = np.array(factors, dtype=float)
         middle = float(np.median(values))
-        return middle if float(np.abs(values - middle).max()) <= ALIKE * abs(middle) else None
+        alike = min(ALIKE * abs(middle), CLOSE * abs(middle - 1.0))
+        return middle if float(np.abs(values - middle).max()) <= alike else None
 
 
 class Search:
@@ -186,5 +188,7 @@ def _sorted(
     slope: float | None = None,
     contrast: float = 0.0,
 ) -> Located:
+    largest = max((w.share for w in worst), default=0.0)
     ordered = sorted(worst, key=lambda w: -abs(w.given - w.found))
+    ordered = [w for w in ordered if w.off >= SMALL or w.share >= BESIDE * largest]
     return Located(tuple(ordered), right, everywhere, slope, contrast)

@@ -16,6 +16,7 @@ from gradient_routes.bench.verification.reading import Reading
 
 LENGTH = 0.05  # natural changes, on both sides of p
 NODES = 2  # of Gauss-Legendre: the error in T^4 is small beside a tenth of a plateau
+BENDS = 0.1  # change of the slope of J over it, relative to the gradient
 STAYS = 0.1  # part of what the plateau would make of the segment that the solver leaves
 
 
@@ -40,7 +41,7 @@ def segment(seen: Examination, reading: Reading) -> Segment | None:
     """Two calls of J, four of the gradient; None where the segment leaves the bounds or a value is missing."""
     assert reading.level is not None
     v, subject = reading.quotients.line.v, seen.subject
-    if reading.truncation(LENGTH) > STAYS * abs(reading.level.value):
+    if reading.truncation(LENGTH) > BENDS * max(reading.size, abs(reading.slope + reading.level.value)):
         return None  # J bends too much on the way
     ends = [subject.p + T * v for T in (LENGTH, -LENGTH)]
     if seen.J.left() < len(ends) or not all(map(subject.inside, ends)):

@@ -16,9 +16,11 @@ from gradient_routes.bench.verification.quotients import Quotients
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
 
-POINTS = 9
+POINTS = 11
 ORDERS = 3  # orders of differences whose noise must be alike
 ALIKE = 4.0  # ratio of noises that are
+THIRD = 3  # order of differences of which a kink changes two, a jump three
+FEW, LEAST = 0.35, 0.5  # quantile of them, and the noises it is at least: 2 where they are normal
 ABRUPT = 300.0  # growth between two steps of what departs from a slope: a smooth J departs by 10 to 100
 ROUNDINGS = 30.0  # roundings of J below which a departure is none
 
@@ -26,7 +28,7 @@ ROUNDINGS = 30.0  # roundings of J below which a departure is none
 def tread_noise(J: Guarded, subject: Subject, line: Line, h: float) -> float | None:
     """Standard deviation of J between p + h v and p + 2 h v, None where J is smooth there or has no value.
 
-    Nine calls, behind p where the points ahead are outside the bounds.
+    Eleven calls, behind p where the points ahead are outside the bounds.
     """
     t = h * (1.0 + np.arange(POINTS) / (POINTS - 1))
     for side in (1.0, -1.0):
@@ -49,8 +51,14 @@ def difference_noise(values: Array) -> float | None:
     for k in range(len(noises) - ORDERS + 1):
         some = noises[k : k + ORDERS]
         if signs[k] and min(some) > 0.0 and max(some) <= ALIKE * min(some):
-            return some[0]
+            return some[0] if _everywhere(values, some[0]) else None
     return None
+
+
+def _everywhere(values: Array, noise: float) -> bool:
+    """Whether most differences have this noise: a kink or a jump among the points makes few of them large."""
+    third = np.abs(np.diff(values, THIRD))
+    return bool(np.quantile(third, FEW) >= LEAST * noise)
 
 
 def abrupt(q: Quotients, slope_off: float, eps: float) -> bool:
