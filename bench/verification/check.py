@@ -33,6 +33,8 @@ def check(subject: Subject, plan: Plan, accept: float = 0.0) -> Check:
     J = Guarded(subject.objective, Account(plan.budget))
     with redirect_stdout(sys.stderr), np.errstate(all="ignore"):
         found = _checked(subject, plan, J, accepted(accept))
+    if found.located is not None:
+        found = replace(found, located=found.located.at(subject.places))
     return replace(found, calls=J.account.calls, gradients=J.account.gradients)
 
 

@@ -26,7 +26,7 @@ ALIKE = 0.05  # relative scatter of one factor, less 1
 SAME = 0.02  # change of one difference, relative to that of the slopes
 CLEAR = 30.0  # uncertainties by which a slope, or a difference of slopes, is known
 FEW = 3  # lines, those at other points included, whose factor is compared
-LEAST = 1e-3  # factor, less 1, of so few lines at p: a fixed number of steps may make a smaller one
+LEAST = 5e-4  # factor, less 1, of so few lines at p: a fixed number of steps may make a smaller one
 FARTHER = 4.0  # times as far as the second point
 FEWEST = 2  # exact components, and others off by one factor
 

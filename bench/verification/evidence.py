@@ -24,7 +24,7 @@ CLEAR = 100.0  # noises that a remainder has to exceed
 LARGEST = 0.1  # step below which the remainder is dominated by one power of h
 SECOND = 2
 RATE = 0.15  # tolerance of rates
-SCATTER = 0.3  # part of a rate below which a remainder is noise of J; a jump of J is told by itself
+SCATTER = 0.4  # part of a rate below which a remainder is noise of J; a jump of J is told by itself
 DECADES = 10.0**2.5  # of steps whose remainders tell a rate
 
 

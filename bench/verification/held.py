@@ -49,5 +49,6 @@ def without(subject: Subject, held: Array) -> Subject:
         scaled=version(subject.scaled),
         active_set=of_whole(subject.active_set),
         fresh=of_whole(subject.fresh),
+        places=free,
         notes=(*subject.notes, f"held by equal bounds, left out: {names}"),
     )

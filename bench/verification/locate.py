@@ -71,6 +71,12 @@ class Located:
         alike = min(ALIKE * abs(middle), CLOSE * abs(middle - 1.0))
         return middle if float(np.abs(values - middle).max()) <= alike else None
 
+    def at(self, places: Array | None) -> Located:
+        """With the author's own indices."""
+        if places is None:
+            return self
+        return replace(self, worst=tuple(replace(w, index=int(places[w.index])) for w in self.worst))
+
 
 class Search:
     """Directions along some components, at the one step where noise and truncation are least."""

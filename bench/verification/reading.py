@@ -24,6 +24,7 @@ NEARER = 0.1  # the same for smaller steps that contradict larger ones
 ZERO = 1e3 * float(np.finfo(np.float64).eps)  # a slope below this part of the change of J is rounding
 TINY = 1e-6  # relative jump of one-sided quotients that is not a kink
 CLEAR = 10.0  # noises of a quotient beyond which its error is truncation
+APART = 0.49  # decades between two ranges of steps that both show a kink: one alone may be noise
 NATURAL = 1e-3  # steps from which on the change of J is one of natural size
 
 
@@ -167,7 +168,9 @@ class Reading:
         found = level(self.quotients.h, self.quotients.jump, np.sqrt(6.0) * self.noise, NEARER * self.size)
         if found is None or abs(found.value) <= max(DIFFERENT * found.uncertainty, TINY * self.scale):
             return None
-        return found
+        every = levels(self.quotients.h, self.quotients.jump, np.sqrt(6.0) * self.noise)
+        apart = [a for a in every if abs(np.log10(a.h / found.h)) >= APART and not a.contradicts(found)]
+        return found if any(abs(a.value) > DIFFERENT * a.uncertainty for a in apart) else None
 
     @property
     def kink(self) -> float | None:

@@ -207,7 +207,9 @@ class Check:
 
 def rows(check: Check, what: Row) -> dict[str, list[Row]]:
     """Tidy rows of the tables `checks` and `points`; `what` holds problem, route and at."""
-    readings = [(1.0, r) for r in check.readings] + [(t.factor, t.reading) for t in check.tightened]
+    readings = [(1.0, r) for r in check.readings]
+    readings += [] if check.elsewhere is None else [(1.0, check.elsewhere)]
+    readings += [(t.factor, t.reading) for t in check.tightened]
     points = [what | point for factor, reading in readings for point in _points(factor, reading)]
     verdict = {name: value for name, value in check.as_dict().items() if name != "name"}  # whose code: in `what`
     return {"checks": [what | verdict], "points": points}

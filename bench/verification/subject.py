@@ -30,6 +30,7 @@ class Subject:
     explain     gradient -> findings on the factors of the gradient
     accuracy    error that the gradient has by its nature, as one by finite differences, relative to |g w| or J
     notes       what was assumed or left out
+    places      (n_p,) the author's own indices of the components; None where they are these
     """
 
     name: str
@@ -51,6 +52,7 @@ class Subject:
     explain: Callable[[Array], list[Finding]] | None = None
     accuracy: float = 0.0
     notes: tuple[str, ...] = ()
+    places: Array | None = None
 
     def moved(self, q: Array) -> Subject:
         """The same subject at another point; what is known at p alone does not go with it."""

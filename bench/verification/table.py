@@ -17,11 +17,14 @@ LEGEND = (
 
 
 def rows(check: Check) -> Iterator[tuple[Reading, tuple[str, ...]]]:
-    """Every line, then the tightened ones."""
+    """Every line, one at a second point, then the tightened ones: the deciding one, or the worst that is left."""
     for reading in check.readings:
         yield reading, _cells(reading.name, reading)
+    if check.elsewhere is not None:
+        yield check.elsewhere, _cells(check.elsewhere.name, check.elsewhere)
     for t in check.tightened:
-        yield t.reading, _cells(f"{t.reading.name}, tightened x {t.factor:g}", t.reading)
+        reading = max(t.plateaus, key=lambda r: r.off, default=t.reading)
+        yield reading, _cells(f"{reading.name}, tightened x {t.factor:g}", reading)
 
 
 def _cells(name: str, reading: Reading) -> tuple[str, ...]:
