@@ -193,7 +193,7 @@ def _how_it_moved(check: Check) -> str:
     """In numbers, where it moved."""
     last = max(check.tightened[-1].plateaus, key=lambda r: r.off, default=check.tightened[-1].reading)
     before = next((r for r in check.readings if r.name == last.name and r.level is not None), None)
-    if before is None or last.level is None or not last.off < STANDS * before.off:
+    if before is None or last.level is None or not last.error < STANDS * before.error:
         return "does not fall"
     return f"falls from {before.off:.2g} to {last.off:.2g} along {last.name} and no further"
 

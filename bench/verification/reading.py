@@ -149,6 +149,11 @@ class Reading:
         return bool(np.isfinite([self.quotients.s_plus, self.quotients.s_minus]).any())
 
     @property
+    def error(self) -> float:
+        """|quotient - slope| at the level: what compares readings of one line, whatever each is relative to."""
+        return abs(self.level.value) if self.level is not None else 0.0
+
+    @property
     def off(self) -> float:
         """|quotient - slope| / scale at the level."""
         assert self.level is not None

@@ -45,7 +45,7 @@ def _same(a: Examination, b: Examination) -> bool:
 
 
 def _fell(after: Reading, before: Reading) -> bool:
-    return after.level is not None and before.level is not None and after.off < FELL * before.off
+    return after.level is not None and before.level is not None and after.error < FELL * before.error
 
 
 def _tightened(seen: Examination, reading: Reading, factor: float) -> tuple[Tightened, Examination] | str:

@@ -89,7 +89,7 @@ def solver_explains(c: Check) -> bool:
 
 def _falls(reading: Reading, before: tuple[Reading, ...]) -> bool:
     """Whether the plateau of a line has fallen below a third."""
-    return any(_same(b, reading) and b.says == "plateau" and reading.off < FALLEN * b.off for b in before)
+    return any(_same(b, reading) and b.says == "plateau" and reading.error < FALLEN * b.error for b in before)
 
 
 def _same(a: Reading, b: Reading) -> bool:
@@ -102,7 +102,7 @@ def _moves(c: Check) -> bool:
     plateaus = c.tightened[-1].plateaus
     if not plateaus:
         return True
-    return all(any(_same(b, r) and r.off < STANDS * b.off for b in before) for r in plateaus)
+    return all(any(_same(b, r) and r.error < STANDS * b.error for b in before) for r in plateaus)
 
 
 def _gross(c: Check) -> bool:

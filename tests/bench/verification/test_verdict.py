@@ -23,7 +23,7 @@ LINES = {whole: SimpleNamespace(whole=whole) for whole in (True, False)}
 
 def line(says: str, off: float = 0.0, index: int | None = None, whole: bool = True) -> Any:
     quotients = SimpleNamespace(line=LINES[whole])
-    return SimpleNamespace(name="v", says=says, off=off, index=index, quotients=quotients, moves=True)
+    return SimpleNamespace(name="v", says=says, off=off, error=off, index=index, quotients=quotients, moves=True)
 
 
 def tightened(*offs: float, says: str = "plateau", moved: bool = True) -> tuple[Tightened, ...]:
