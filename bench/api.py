@@ -180,11 +180,11 @@ def invert(
     rate        of adam's steps, in natural changes of p
 
     Returns an Inversion: `p` and `gradient` (n_p,) at the end, `iterates` with J, misfit and the solves paid so far,
-    `truth` where it is known, `end`: why it stopped.
+    `truth` where it is known, `end`: why it stopped, `misled`: whether the gradient is not that of J.
 
     >>> found = invert("bar", optimizer="gauss-newton")
     >>> found.end
-    'converged: |dJ/dp| is 1e-08 of that at the start'
+    'converged: |dJ/dp| is 1e-08 of that at the start, confirmed by 4 forward solves'
     >>> float(abs(found.p - found.truth)[:5].max()) < 1e-6  # what lies behind the last sensor is not seen
     True
 

@@ -25,6 +25,7 @@ INVERSION = (
     Column("adjoint_solves", "INTEGER", "1", "linearized and transposed solves so far, Newton steps left out"),
     Column("seconds", "REAL", "s", "so far"),
     Column("distance", "REAL", "1", "|p - p_true| / |p_0 - p_true|, where the truth is known"),
+    Column("ending_solves", "INTEGER", "1", "forward solves after the last step, to explain or to confirm the end"),
     Column("says", "TEXT", "", "what happened there: a stall, a step out of the domain, why it stopped"),
 )
 

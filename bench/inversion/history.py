@@ -9,6 +9,7 @@ import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.objective import Evaluation, Objective
+from gradient_routes.bench.inversion.slopes import EPS, ROUNDED
 from gradient_routes.problems.problem import Array
 
 
@@ -38,6 +39,7 @@ class History:
 
     truth, p_0  for |p - p_true| / |p_0 - p_true|
     offset      iterations of the run that this one resumes
+    ratios      of the changes of J that the gradient promises, by the trapezoidal rule, to the actual ones
     """
 
     objective: Objective
@@ -46,7 +48,9 @@ class History:
     watch: Watch = lambda iterate: None
     iterates: list[Iterate] = field(default_factory=list)
     offset: int = 0
+    first: Evaluation | None = None
     last: Evaluation | None = None
+    ratios: list[float] = field(default_factory=list)
 
     def take(self, found: Evaluation, says: str | None = None) -> None:
         """Record an accepted step, and whether steps before it left the domain of J."""
@@ -67,9 +71,16 @@ class History:
             self._distance(found.p),
             says,
         )
-        self.last = found
+        self.first, self.last = self.first or found, found
+        self._compare(objective.accepted, found)
         self.iterates.append(iterate)
         self.watch(iterate)
+
+    def _compare(self, before: Evaluation, found: Evaluation) -> None:
+        """What J does in a step against what its gradients say; exact for a quadratic J."""
+        actual = found.J - before.J
+        if abs(actual) > ROUNDED * EPS * max(abs(found.J), abs(before.J)):
+            self.ratios.append(float(0.5 * (before.by_x + found.by_x) @ (found.x - before.x)) / actual)
 
     def _distance(self, p: Array) -> float | None:
         if self.truth is None:

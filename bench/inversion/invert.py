@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import warnings
 from collections.abc import Callable
@@ -14,6 +15,8 @@ import numpy as np
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec, point
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.inversion.columns import RUN
+from gradient_routes.bench.inversion.confirmation import confirmed
+from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
 from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, optimizer
@@ -44,6 +47,7 @@ class Inversion:
 
     p, gradient (n_p,) at the end; start p_0; truth where known; view: the problem's own columns
     end      why it stopped; interrupted: by Ctrl-C
+    ending_solves  forward solves after the last step, to explain or to confirm the end
     scaled   the units of the optimizer's variables; warning: what is wrong with them
     """
 
@@ -65,9 +69,20 @@ class Inversion:
     truth: Array | None = field(repr=False)
     view: ParameterView = field(repr=False)
     end: str = field(repr=False)
+    ending_solves: int = field(repr=False)
     interrupted: bool = field(repr=False)
     warning: str | None = field(repr=False)
     scaled: str = field(repr=False)
+
+    @property
+    def misled(self) -> bool:
+        """Whether the gradient has turned out not to be that of J."""
+        return self.end.startswith(MISLED)
+
+    @property
+    def forward_solves(self) -> int:
+        """All of them."""
+        return self.iterates[-1].forward_solves + self.ending_solves
 
     @property
     def shared(self) -> Row:
@@ -77,7 +92,8 @@ class Inversion:
     def tables(self) -> dict[str, list[Row]]:
         """Tidy: one row an iterate, one a parameter."""
         last = len(self.iterates) - 1
-        rows = [self.shared | asdict(iterate) for iterate in self.iterates]
+        rows = [self.shared | asdict(iterate) | {"ending_solves": None} for iterate in self.iterates]
+        rows[last]["ending_solves"] = self.ending_solves
         rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end)))
         return {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
 
@@ -127,7 +143,8 @@ def invert(
         warnings.filterwarnings("ignore", "The line search algorithm")  # SciPy's: `end` tells more
         try:
             found = objective.start(p)
-            history.take(found, objective.doubt())
+            doubt = objective.doubt()
+            history.take(found, doubt)
             if objective.slope_0 == 0.0:
                 end = "converged: dJ/dp is 0 at the start"
             else:
@@ -138,7 +155,14 @@ def invert(
             if not history.iterates:
                 raise
             end, interrupted = "interrupted", True
-    last = history.last
+        try:
+            if not interrupted:
+                end = confirmed(objective, history, end, engine.limits.tolerance, doubted=doubt is not None)
+        except KeyboardInterrupt:  # what has been found stays
+            end, interrupted = f"{end}; not confirmed: interrupted", True
+    if end.startswith(MISLED):
+        end += f" - see {checked_by(spec, route, at)}"
+    last, ending = history.last, objective.forward_solves - history.iterates[-1].forward_solves
     assert last is not None
     try:
         shown = view(problem, last, engine.solver, complete=not interrupted)
@@ -163,10 +187,17 @@ def invert(
         history.truth,
         shown,
         end,
+        ending,
         interrupted,
         variables.warning(data(problem, last.p)),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
     )
+
+
+def checked_by(spec: ProblemSpec, route: RouteSpec, at: str) -> str:
+    """The command that judges the gradient."""
+    words = ["routes", "check", "--problem", spec.selector, "--route", route.selector]
+    return shlex.join(words if at == "start" else [*words, "--at", at])
 
 
 def data(problem: Problem, p: Array) -> Array | None:

@@ -38,8 +38,8 @@ class Point:
     def row(self) -> Row:
         last = self.inversion.iterates[-1]
         own = {name: getattr(self, name) for name in ("misfit", "phi", "curvature", "discrepancy", "chosen")}
-        counts = {"iterations": last.iteration, "forward_solves": last.forward_solves, "distance": last.distance}
-        return self.inversion.shared | own | counts | {"ended": self.inversion.end}
+        counts = {"iterations": last.iteration, "forward_solves": self.inversion.forward_solves}
+        return self.inversion.shared | own | counts | {"distance": last.distance, "ended": self.inversion.end}
 
 
 def minima(

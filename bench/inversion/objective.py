@@ -63,6 +63,10 @@ class Objective:
         self.J_0, self.slope_0 = abs(first.J) or 1.0, norm2(first.by_x)
         return first
 
+    def with_solver(self, solver: Solver) -> Objective:
+        """The same J and route by other forward solves; to be started."""
+        return Objective(self.problem, self.route, self._options, solver, self.variables)
+
     @property
     def accepted(self) -> Evaluation:
         """The last accepted step; after `start` only."""

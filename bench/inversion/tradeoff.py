@@ -55,8 +55,8 @@ def trade_off(
 def _trade(found: Sequence[Inversion]) -> Trade:
     p, truth = np.array([each.p for each in found]), found[0].truth
     assert truth is not None
-    mean = p.mean(axis=0)
-    return Trade(found[0], len(found), float(np.mean((mean - truth) ** 2)), float(np.mean((p - mean) ** 2)))
+    mean, shown = p.mean(axis=0), next((each for each in found if each.misled), found[0])
+    return Trade(shown, len(found), float(np.mean((mean - truth) ** 2)), float(np.mean((p - mean) ** 2)))
 
 
 def drawn(spec: ProblemSpec, draws: int) -> list[Problem]:

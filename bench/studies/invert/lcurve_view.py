@@ -42,7 +42,7 @@ def table(points: Sequence[Point]) -> Table:
     for name in ("alpha", "misfit", "Phi", "curvature", "misfit / noise", "off", "iterations", "fwd", ""):
         out.add_column(name, justify="right" if name else "left")
     for point in points:
-        row = point.row
+        row, misled = point.row, point.inversion.misled
         out.add_row(
             f"{row['alpha']:.3g}",
             number(row["misfit"], 4),
@@ -52,7 +52,7 @@ def table(points: Sequence[Point]) -> Table:
             number(row["distance"], 3),
             str(row["iterations"]),
             str(row["forward_solves"]),
-            row["chosen"] or ("" if point.converged else "not converged"),
+            row["chosen"] or ("" if point.converged else "wrong gradient" if misled else "not converged"),
         )
     return out
 

@@ -82,7 +82,7 @@ def run(
     resume: bool,
     solver: Solver,
     kept: Path | None,
-) -> None:
+) -> int:
     """An interrupt or a failure ends the run, not what it has found by then."""
     _check(iterations, tolerance, rate, draws, alpha_sweep, minibatch, optimizer)
     if resume and kept is None:
@@ -95,14 +95,16 @@ def run(
         asked.sweep(alpha_sweep, draws)
     if asked.failure is not None:
         raise asked.failure
+    return 1 if asked.misled else 0
 
 
 class Run:
-    """One call; `failure` is what ended it early."""
+    """One call; `failure` is what ended it early, `misled` whether a gradient was not that of J."""
 
     def __init__(self, say: Say, spec: ProblemSpec, routes: Sequence[RouteSpec], engine: Engine, at: str) -> None:
         self.say, self.spec, self.routes, self.engine, self.at = say, spec, routes, engine, at
         self.failure: BaseException | None = None
+        self.misled = False
 
     def each(self, resumed: Path | None, minibatch: int | None, seed: int) -> None:
         """Route by route, from where each ended in the store `resumed` if given; then the cost of each."""
@@ -127,6 +129,7 @@ class Run:
             self.say(Found(Begun(title, problem.truth() is not None)))
             found = invert(self.spec, route, self.engine, self.at, p, self._show, problem, run, offset)
             yield found
+            self.misled = self.misled or found.misled
             self.say(Found(Ended(found, one_shot)))
             self._warn(found)
             if found.interrupted:
@@ -158,12 +161,14 @@ class Run:
             )
         if draws is not None:
             trades = self._until_it_ends(trade_off(self.spec, route, self.engine, alphas, draws, self.at))
+            self._judge([trade.inversion for trade in trades])
             self._keep("tradeoff", [trade.row for trade in trades])
             self.say(Found(Trades(trades)))
             return
         points = l_curve(self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at))))
         best = next((point for point in points if point.chosen), points[-1]).inversion
         self._warn(best)
+        self._judge([point.inversion for point in points])
         self._keep("lcurve", [point.row for point in points])
         for table, rows in best.tables.items():
             self._keep(table, rows)
@@ -192,6 +197,13 @@ class Run:
     def _keep(self, table: str, rows: Iterable[dict[str, object]]) -> None:
         for row in rows:
             self.say(Kept(table, row))
+
+    def _judge(self, swept: Sequence[Inversion]) -> None:
+        """Say once that the gradient is wrong, of a sweep whose ends are not shown one by one."""
+        ends = [found.end for found in swept if found.misled]
+        self.misled = bool(ends)
+        for end in ends[:1]:
+            self.say(Note(f"invert: {end}"))
 
     def _warn(self, found: Inversion) -> None:
         if found.warning is not None:
