@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 import math
-from functools import partial
+from functools import cached_property, partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from gradient_routes.problems.fem.prolongation import prolongate
 from gradient_routes.problems.fem.supg import Supg, on_inflow, unit_vector
 from gradient_routes.problems.problem import (
     Array,
+    Discretization,
     Fields,
     Linearization,
     Offers,
@@ -205,9 +206,30 @@ class Advection(Problem):
         small Peclet numbers.
         """
         kappa, _ = self.coefficients(p)
-        A = self.supg.pattern.assemble(self.supg.cell_matrices(kappa).swapaxes(1, 2))
+        A = self.supg.pattern.assemble(_transposed(self.supg, kappa))
         dR_df = np.broadcast_to(-self.supg.m, self.supg.dofs.shape)
         return A, self._R_p(dR_df if self.source_unknown else self.supg.at_corners(u) @ self.supg.D, kappa)
+
+    def inconsistent_adjoint(self, u: Array, p: Array, other: Discretization) -> tuple[Any, Operator, Array] | None:
+        """By the quadrature at corners, without streamline terms, or on a mesh of twice the mesh size (n even)."""
+        supg = self._others.get(other)
+        if supg is None:
+            return None
+        kappa, f = self.coefficients(p)
+        J_u = self.w * self._misfit(u)
+        if other == "mesh":
+            I = supg.interpolation(self.supg.x)
+            R_p = self.linearize(u, p).R_p
+            return supg.pattern.assemble(_transposed(supg, _coarsened(kappa, self.supg, supg))), I.T @ R_p, I.T @ J_u
+        by_cell = supg.dR_df(kappa) if self.source_unknown else supg.dR_dkappa(u, kappa, f)
+        return supg.pattern.assemble(_transposed(supg, kappa)), self._R_p(by_cell, kappa), J_u
+
+    @cached_property
+    def _others(self) -> dict[str, Supg]:
+        """Other discretizations of the same equation."""
+        b = self.supg.b
+        found = {"quadrature": Supg.of(self.n, b, nodal=True), "stabilization": self.supg.unstabilized}
+        return found if self.n % 2 else found | {"mesh": Supg.of(self.n // 2, b)}
 
     # --- synthetic data
 
@@ -253,6 +275,19 @@ class Advection(Problem):
         name, values = ("f", f) if self.source_unknown else ("kappa", kappa)
         cell_data = {name: values, f"dJ_d{name}": gradient / kappa if self.log else gradient}
         return Fields(points, "quad", self.supg.mesh.t.T[:, ::-1], point_data, cell_data)
+
+
+def _transposed(supg: Supg, kappa: Array) -> Array:
+    """Element matrices of R_u^T."""
+    return np.asarray(supg.cell_matrices(kappa).swapaxes(1, 2))
+
+
+def _coarsened(values: Array, fine: Supg, coarse: Supg) -> Array:
+    """Means over the four cells that make one of the coarse mesh."""
+    from scipy.spatial import KDTree
+
+    _, parent = KDTree(coarse.centres).query(fine.centres)
+    return np.bincount(parent, values) / 4.0
 
 
 def _check(

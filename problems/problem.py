@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 Structure = Literal["spd", "symmetric", "general"]
+Discretization = Literal["quadrature", "stabilization", "mesh"]
 
 
 class Offers(enum.Flag):
@@ -48,6 +49,7 @@ class Offers(enum.Flag):
     INTEGRAL = 256
     CONTINUOUS_ADJOINT = 512
     FIELDS = 1024
+    INCONSISTENT_ADJOINT = 2048
 
 
 OPTIONAL = (
@@ -57,6 +59,7 @@ OPTIONAL = (
     Offers.INTEGRAL,
     Offers.CONTINUOUS_ADJOINT,
     Offers.FIELDS,
+    Offers.INCONSISTENT_ADJOINT,
 )
 OFFERED_AS = {
     Offers.VALUE: "J(p) as a number",
@@ -336,6 +339,14 @@ class Problem:
         """The adjoint equation differentiated first and discretized then: A and Q, A lam = -J_u, dJ/dp = J_p + Q^T lam.
 
         They equal R_u^T and R_p only as the mesh size h goes to 0, and so does the gradient.
+        """
+        return None
+
+    def inconsistent_adjoint(self, u: Array, p: Array, other: Discretization) -> tuple[Any, Operator, Array] | None:
+        """The adjoint equation with another quadrature, stabilization or mesh than R: A, Q and b, A lam = -b,
+        dJ/dp = J_p + Q^T lam. None where there is no such mesh.
+
+        As those of the continuous adjoint they equal R_u^T, R_p and J_u only as h goes to 0.
         """
         return None
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from gradient_routes.problems.problem import (
     Array,
+    Discretization,
     Linearization,
     Operator,
     Parameters,
@@ -135,6 +136,10 @@ class Subspace(Wrapped):
     def continuous_adjoint(self, u: Array, p: Array) -> tuple[Any, Operator] | None:
         inner = super().continuous_adjoint(u, p)
         return None if inner is None else (inner[0], Product(inner[1], self.V))
+
+    def inconsistent_adjoint(self, u: Array, p: Array, other: Discretization) -> tuple[Any, Operator, Array] | None:
+        inner = super().inconsistent_adjoint(u, p, other)
+        return None if inner is None else (inner[0], Product(inner[1], self.V), inner[2])
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         """The rows of the components; a direction has none."""

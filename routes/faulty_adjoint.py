@@ -16,17 +16,34 @@ from gradient_routes.routes.newton import State
 from gradient_routes.routes.route import Offers, Result, Work, route
 
 Fault = Annotated[
-    Literal["sign", "factor", "transpose", "missing-term", "stale", "loose", "functional", "otd", "scale"],
+    Literal[
+        "sign",
+        "factor",
+        "transpose",
+        "missing-term",
+        "stale",
+        "loose",
+        "functional",
+        "otd",
+        "scale",
+        "quadrature",
+        "stabilization",
+        "mesh",
+    ],
     "wrong sign of lam; dR/dp of one component doubled; R_u in place of R_u^T; J_p omitted; factors of the previous"
     " Newton step; forward solve at 1e8 times the tolerance; gradient of the integral that J approximates; adjoint"
-    " equation differentiated before it is discretized; chain rule of p = log(...) omitted",
+    " equation differentiated before it is discretized; chain rule of p = log(...) omitted; adjoint equation with"
+    " another quadrature, without stabilization, on a coarser mesh",
 ]
 Component = Annotated[int | None, "of fault=factor, counted from 1 [the most sensitive]"]
 LOOSE = 1e8  # times the forward tolerance: 1e-4 by default
 
 
+OWN = ("otd", "quadrature", "stabilization", "mesh")  # the adjoint equation has a discretization of its own
+
+
 def cost(n_p: int, forward: ForwardWork, *, fault: str, component: int | None) -> Work:
-    if fault == "otd":
+    if fault in OWN:
         return forward.cold + Work(factorizations=1, solves=1)
     if fault == "loose" and forward.counted is not None:
         return forward.counted  # how many steps the looser tolerance saves is known once they are counted
@@ -44,6 +61,7 @@ def missing(problem: Problem, *, fault: str, component: int | None) -> str | Non
     lacks = {
         "functional": (Offers.INTEGRAL not in problem.offers, "a J that stands for an integral"),
         "otd": (Offers.CONTINUOUS_ADJOINT not in problem.offers, "an adjoint equation of its own"),
+        **dict.fromkeys(OWN[1:], (Offers.INCONSISTENT_ADJOINT not in problem.offers, "another discretization")),
         "scale": (not problem.parameters.unit_of(0).startswith("log"), "parameters that are logarithms"),
     }
     lacking, what = lacks.get(fault, (False, ""))
@@ -66,6 +84,9 @@ def faulty_adjoint(model: Model, p: Array, *, fault: Fault = "sign", component: 
     if fault == "otd":
         A, Q = _known(model.problem.continuous_adjoint(state.u, p))
         lin, lam = replace(lin, R_p=Q), model.solve_linear(model.factorize(A), -lin.J_u)
+    elif fault == "quadrature" or fault == "stabilization" or fault == "mesh":
+        A, Q, b = _known(model.problem.inconsistent_adjoint(state.u, p, fault))
+        lin, lam = replace(lin, R_p=Q), model.solve_linear(model.factorize(A), -b)
     else:
         lam = _adjoint_state(model, state, lin, fault)
     gradient = lin.J_p + lin.R_p.T @ lam
@@ -80,7 +101,7 @@ def faulty_adjoint(model: Model, p: Array, *, fault: Fault = "sign", component: 
             gradient[i] += data_term[i]
         case "scale":
             gradient = gradient / np.exp(p)
-    return Result(J, gradient, state.u, state.residual, lam)
+    return Result(J, gradient, state.u, state.residual, lam if lam.shape == state.u.shape else None)
 
 
 def _adjoint_state(model: Model, state: State, lin: Linearization, fault: str) -> Array:

@@ -9,7 +9,7 @@ The stabilization is consistent: in a square cell div(kappa grad u) of a bilinea
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,12 +47,14 @@ class Supg:
     pattern: GeneralPattern
 
     @classmethod
-    def of(cls, n: int, b: Array) -> Supg:
+    def of(cls, n: int, b: Array, nodal: bool = False) -> Supg:
+        """`nodal`: integrate by the values at the corners of a cell, in place of a rule that is exact."""
         from skfem import Basis, BilinearForm, ElementQuad1, LinearForm, MeshQuad
         from skfem.helpers import dot, grad
 
         mesh = MeshQuad.init_tensor(*[np.linspace(0.0, 1.0, n + 1)] * 2)
-        cell = Basis(mesh, ElementQuad1(), elements=np.array([0]))
+        corners = (np.array([[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]]), np.full(4, 0.25)) if nodal else None
+        cell = Basis(mesh, ElementQuad1(), elements=np.array([0]), quadrature=corners)
 
         def along(v: Any) -> Any:
             return b[0] * grad(v)[0] + b[1] * grad(v)[1]
@@ -146,6 +148,17 @@ class Supg:
         else:
             basis = Basis(self.mesh, ElementQuad1())
         return BilinearForm(lambda u, v, _: u * v).assemble(basis)[self.free][:, self.free]
+
+    @property
+    def unstabilized(self) -> Supg:
+        """The Galerkin method on the same mesh."""
+        return replace(self, S=np.zeros_like(self.S), s=np.zeros_like(self.s))
+
+    def interpolation(self, x: Array) -> Any:
+        """Values at the points x (m, 2) of a u with the degrees of freedom of this mesh, a sparse (m, n_u)."""
+        from skfem import Basis, ElementQuad1
+
+        return Basis(self.mesh, ElementQuad1()).probes(x.T).tocsc()[:, self.free]
 
     @property
     def neighbours(self) -> Array:

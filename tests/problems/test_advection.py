@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import relative_error, somewhere
@@ -11,6 +13,7 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.supg import Supg, unit_vector
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.faulty_adjoint import faulty_adjoint
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.synthetic_data import with_synthetic_data
 
@@ -136,6 +139,53 @@ def test_the_continuous_adjoint_misses_the_gradient_by_less_on_finer_meshes(opti
     assert 1e-3 < errors[1] < 0.5
     assert (rates(errors) > 1.0).all()
     assert rates(errors)[-1] > 1.7  # tau = O(h^2) once cells are narrow: 1.9
+
+
+@pytest.mark.parametrize("options", [{}, {"unknown": "source"}, {"sensors": "everywhere", "alpha": 1e-3}])
+@pytest.mark.parametrize("fault", ["quadrature", "stabilization", "mesh"])
+def test_an_adjoint_of_another_discretization_is_wrong_and_less_so_on_finer_meshes(fault: str, options: dict) -> None:
+    errors = []
+    for n in MESHES:
+        model = Model(Advection(n=n, **options))
+        p = model.parameters.start
+        wrong = faulty_adjoint.prepare(model, p, fault=fault)(p)
+        errors.append(relative_error(wrong.gradient, adjoint.prepare(model, p)(p).gradient))
+    assert 0.01 < errors[1] < 0.7
+    assert (np.diff(errors) < 0.0).all()
+    assert (rates(errors)[1:] > 0.8).all()  # a coarse mesh of 2 by 2 cells is not in the asymptotic range
+
+
+def test_the_adjoint_of_another_discretization_is_that_of_its_equation() -> None:
+    """A and Q belong to one residual; its gradient of J at its own state would be right."""
+    advection = Advection(n=4)
+    p = somewhere(advection)
+    u = Model(advection).solve(p).u
+    for other, supg in (("quadrature", Supg.of(4, advection.supg.b, nodal=True)), ("stabilization", None)):
+        A, Q, b = advection.inconsistent_adjoint(u, p, other)
+        supg = supg or replace(advection.supg, S=0.0 * advection.supg.S, s=0.0 * advection.supg.s)
+        kappa, f = advection.coefficients(p)
+        v, h = np.random.default_rng(0).standard_normal(len(p)), 1e-6
+        by_p = (supg.residual(u, kappa * np.exp(h * v), f) - supg.residual(u, kappa * np.exp(-h * v), f)) / (2.0 * h)
+        np.testing.assert_allclose(Q @ v, by_p, rtol=1e-7, atol=1e-9)
+        w = np.random.default_rng(1).standard_normal(len(u))
+        np.testing.assert_allclose(A.T @ w, supg.residual(u + w, kappa, f) - supg.residual(u, kappa, f), atol=1e-12)
+        np.testing.assert_array_equal(b, advection.linearize(u, p).J_u)
+    assert Advection(n=3).inconsistent_adjoint(u, p, "mesh") is None
+
+
+def test_the_coarse_adjoint_is_interpolated_and_its_kappa_the_mean() -> None:
+    fine, coarse = (Supg.of(n, unit_vector(30.0)) for n in (6, 3))
+    I = coarse.interpolation(fine.x)
+    x, y = coarse.x.T
+    np.testing.assert_allclose(I @ (x * y), np.prod(fine.x, axis=1), atol=1e-14)
+    advection = Advection(n=6, parametrization="raw")
+    p = advection.parameters.start.copy()
+    A, *_ = advection.inconsistent_adjoint(Model(advection).solve(p).u, p, "mesh")
+    centres = advection.supg.centres
+    means = [p[(np.abs(centres - c) < 0.17).all(axis=1)].mean() for c in coarse.centres]
+    w = np.random.default_rng(1).standard_normal(len(coarse.free))
+    expected = coarse.tangent(np.array(means)).T @ w
+    np.testing.assert_allclose(A @ w, expected, atol=1e-12)
 
 
 def test_the_adjoint_advection_is_that_of_its_own_equation() -> None:

@@ -32,6 +32,7 @@ CHANGED = {
         "reference",
         "observation",
         "continuous_adjoint",
+        "inconsistent_adjoint",
         "view",
         "truth",
     ),
@@ -132,6 +133,9 @@ class Moving(Problem):
     def continuous_adjoint(self, u: Array, p: Array) -> Any:
         return np.eye(1), np.array([[4.0, 5.0, 6.0]])
 
+    def inconsistent_adjoint(self, u: Array, p: Array, other: str) -> Any:
+        return np.eye(1), np.array([[7.0, 8.0, 9.0]]), u
+
     def load_cases(self) -> list[Problem]:
         return [self, self]
 
@@ -146,6 +150,7 @@ def test_derivatives_by_p_become_those_by_c() -> None:
     assert part.observation(u, c).S_p @ v == pytest.approx([1.0])
     assert part.observation(u, c).S_p.T @ np.ones(1) == pytest.approx([1.0, 0.0])
     assert part.continuous_adjoint(u, c)[1] @ v == pytest.approx([65.0])
+    assert part.inconsistent_adjoint(u, c, "mesh")[1] @ v == pytest.approx([98.0])
     assert part.linearize(u, c).R_p @ v == pytest.approx([32.0])
     assert [one.p(c).tolist() for one in part.load_cases()] == [[1.0, 2.0, 3.0]] * 2
     assert part.truth().tolist() == [5.0, 3.0]

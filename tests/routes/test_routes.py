@@ -175,6 +175,11 @@ IMPOSSIBLE = {  # what the problem lacks for the fault
     ("block[n=2]", "otd"): "an adjoint equation of its own",
     ("block[follower]", "otd"): "an adjoint equation of its own",
     ("block[follower]", "scale"): "parameters that are logarithms",
+    **{
+        (name, fault): "another discretization"
+        for name in ("bar", "block[n=2]", "block[follower]")
+        for fault in ("quadrature", "stabilization", "mesh")
+    },
 }
 
 
