@@ -143,6 +143,7 @@ ORDER = (
     "unrolling",
     "kink",
     "invert",
+    "consistency",
     "identify",
 )
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec, point
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
@@ -42,11 +43,25 @@ class Engine:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """How the optimizer itself stopped, before differences of J were asked.
+
+    says           its reason
+    evaluations    of J and its gradient
+    shortest_step  |x - x_k| of the shortest step tried in vain after the last one, x being p in natural changes
+    """
+
+    says: str
+    evaluations: int
+    shortest_step: float | None
+
+
+@dataclass(frozen=True)
 class Inversion:
     """The result: fields are columns of its table, and the arrays behind them.
 
     p, gradient (n_p,) at the end; start p_0; truth where known; view: the problem's own columns
-    end      why it stopped; interrupted: by Ctrl-C
+    end      why it stopped; stop: why the optimizer itself did; interrupted: by Ctrl-C
     ending_solves  forward solves after the last step, to explain or to confirm the end
     scaled   the units of the optimizer's variables; warning: what is wrong with them
     """
@@ -69,6 +84,7 @@ class Inversion:
     truth: Array | None = field(repr=False)
     view: ParameterView = field(repr=False)
     end: str = field(repr=False)
+    stop: Stop = field(repr=False)
     ending_solves: int = field(repr=False)
     interrupted: bool = field(repr=False)
     warning: str | None = field(repr=False)
@@ -155,6 +171,7 @@ def invert(
             if not history.iterates:
                 raise
             end, interrupted = "interrupted", True
+        stop = stopped(objective, end)
         try:
             if not interrupted:
                 end = confirmed(objective, history, end, engine.limits.tolerance, doubted=doubt is not None)
@@ -187,11 +204,17 @@ def invert(
         history.truth,
         shown,
         end,
+        stop,
         ending,
         interrupted,
         variables.warning(data(problem, last.p)),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
     )
+
+
+def stopped(objective: Objective, says: str) -> Stop:
+    vain = [norm2(tried.x - objective.accepted.x) for tried in objective.tried]
+    return Stop(says, objective.evaluations, min(vain, default=None))
 
 
 def checked_by(spec: ProblemSpec, route: RouteSpec, at: str) -> str:

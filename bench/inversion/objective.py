@@ -51,6 +51,7 @@ class Objective:
         self.begun = time.perf_counter()
         self.tried: list[Evaluation] = []  # since the last accepted step
         self.J_0, self.slope_0 = 1.0, 0.0  # J and |dJ/dx| at the start
+        self.evaluations = 0
         self._options = options
         self._gradient: Any = None
         self._accepted: Evaluation | None = None
@@ -126,6 +127,7 @@ class Objective:
 
     def _evaluate(self, x: Array) -> Evaluation:
         p = self.problem.parameters.check(self.variables.p(x), self.problem.name)
+        self.evaluations += 1
         with np.errstate(all="ignore"):
             found = self._gradient(p)
             J = self.model.value(p) if found.J is None else float(found.J)
