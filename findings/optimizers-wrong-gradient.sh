@@ -2,9 +2,9 @@
 # Software:  NLopt 2.11.0, Ipopt 3.14.19 in CasADi 3.8.2 (limited-memory Hessian) with NumPy 2.4.6, Python 3.11
 # Behaviour: given a gradient of the wrong sign, NLopt's MMA, CCSAQ and SLSQP return a positive code (XTOL_REACHED or
 #            FTOL_REACHED, success) at the start; LBFGS raises. With an offset, all but LBFGS return success where the
-#            true gradient is not 0. Ipopt runs away at a wrong sign and says so. All of them report success at the start
-#            for a gradient of zero. J is Rosenbrock's valley, 24.2 at its start (-1.2, 1) and 0 at its minimum; 1 %: one
-#            component 1 % too large, the other too small; offset: 1.6 on both, where |g| is 233 at the start.
+#            true gradient is not 0. Ipopt runs away at a wrong sign and says so. All of them report success at the
+#            start for a gradient of zero. J is Rosenbrock's valley, 24.2 at its start (-1.2, 1), 0 at its minimum; 1 %:
+#            one component 1 % too large, the other too small; offset: 1.6 on both, where |g| is 233 at the start.
 # Output:            1 %                offset            sign              zero
 #            LBFGS   success, minimum   failure, start    failure, start    success, start
 #            MMA     failure, minimum   success, between  success, start    success, start

@@ -36,10 +36,11 @@ def confirmed(objective: Objective, history: History, end: str, tolerance: float
     before = objective.forward_solves
     remarks = []
     for v in directions(objective):
-        if not doubted and flat(objective, v, tolerance):
+        claim = tolerance * objective.slope_0 * norm2(v)
+        if not doubted and flat(objective, v, claim):
             continue
         seen = examined(objective, objective.accepted, v)
-        if seen.blame == "gradient":
+        if seen.blame == "gradient" and abs(seen.slopes.promised - seen.slopes.found) > claim:
             return misled("at the end its slope along a random direction", seen.slopes)
         if seen.blame == "solves":
             remarks.append(f"loose forward solves (--rtol {objective.model.solver.rtol:g}) leave a slope")
@@ -66,16 +67,15 @@ def directions(objective: Objective) -> list[Array]:
     return found
 
 
-def flat(objective: Objective, v: Array, tolerance: float) -> bool:
-    """Whether J(x + h v) - J(x - h v) is what the gradient promises, to the tolerance of the inversion, to rounding
-    and to truncation, which is h^3 J'''/3; two forward solves.
+def flat(objective: Objective, v: Array, claim: float) -> bool:
+    """Whether J(x + h v) - J(x - h v) is what the gradient promises, up to the slope that the inversion claims to have
+    left, to rounding, and to truncation, which is h^3 J'''/3; two forward solves.
     """
     at = objective.accepted
     J = Along(objective, at.x, v)
     h = STEP * J.size
     below, above = J(-STEP), J(STEP)
     off = abs(above - below - 2.0 * h * float(at.by_x @ v))
-    claimed = 2.0 * h * tolerance * objective.slope_0 * norm2(v)
     rounding = ROUNDED * EPS * max(abs(at.J), abs(above), abs(below))
     truncation = CURVED * STEP * abs(above - 2.0 * at.J + below)
-    return off <= claimed + rounding + truncation  # never, where J is not defined
+    return off <= 2.0 * h * claim + rounding + truncation  # never, where J is not defined

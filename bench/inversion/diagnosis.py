@@ -32,7 +32,7 @@ def explained(objective: Objective) -> str:
     if seen.blame == "solves":
         rtol = objective.model.solver.rtol
         return f"the forward solves are too loose for the slope of J (--rtol {rtol:g}) - tighten them"
-    if found.disagree:
+    if found.disagree and objective.route.accuracy > 0.0:
         return (
             f"the error of {objective.route.name} hides the slope of J ({found.promised:.4g} by the gradient,"
             f" {found.found:.4g} by differences of J) - use a more accurate route"

@@ -18,6 +18,7 @@ DISAGREE = 1e-2  # relative difference of slopes that no uncertainty explains
 EPS = float(np.finfo(np.float64).eps)
 ROUNDED = 1e3  # eps |J|: rounding of the terms of J; more is noise
 KINKED = 0.5  # part of the difference of one-sided slopes left at a tenth of the step: 0.1 where J is smooth
+PRECISE = 1e-9  # of the gradient at the start: error that linear solves leave in any gradient
 TIGHT = 1e-12  # tolerance of forward solves that disturbs neither J nor its gradient
 
 
@@ -109,7 +110,8 @@ def slopes(objective: Objective, at: Evaluation, v: Array) -> Slopes:
     best = min(best, len(h) - 3) if kink else best  # a step that reaches over the kink
     left, right = (here - below[best]) / h[best], (above[best] - here) / h[best]
     curvature = abs(float(gap[best] / h[best]))
-    natural = objective.route.accuracy * (objective.slope_0 * norm2(v) + curvature)
+    steepest = objective.slope_0 * norm2(v)
+    natural = max(PRECISE * steepest, objective.route.accuracy * (steepest + curvature))
     return Slopes(
         promised, natural, float(central[best]), float(uncertain[best]), noise, float(left), float(right), kink, None
     )
