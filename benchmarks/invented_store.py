@@ -292,6 +292,21 @@ def scaling(problem: str, n: int, rng: np.random.Generator) -> Tables:
     return {"scaling_fits": fits, "break_even": races}
 
 
+def consistency(problem: str, n: int, rng: np.random.Generator) -> Tables:
+    runs: list[Row] = []
+    steps: list[Row] = []
+    what = {"problem": f"advection[n={n}]", "at": "start", "optimizer": "lbfgs"}
+    for route, floor in (("adjoint", 1e-16), ("faulty-adjoint[fault=otd]", 1e-8), ("faulty-adjoint[fault=mesh]", 1e-6)):
+        above = [10.0**-k + floor for k in range(12)]
+        end = {"iterations": 11, "evaluations": 40, "objective": 1e-4 + above[-1], "above_minimum": above[-1]}
+        outcome = {"status": "ok", "outcome": "converged" if route == "adjoint" else "stalled", "gradient_norm": floor}
+        runs.append(what | {"route": route} | end | outcome)
+        for k, height in enumerate(above):
+            state = {"objective": 1e-4 + height, "above_minimum": height, "own_gradient_norm": height**0.5}
+            steps.append(what | {"route": route, "iteration": k, "forward_solves": k + 1, "step_length": 0.1} | state)
+    return {"consistency": runs, "consistency_steps": steps}
+
+
 Maker = Callable[[str, int, np.random.Generator], Tables]
 MAKERS: tuple[Maker, ...] = (
     checks,
@@ -300,6 +315,7 @@ MAKERS: tuple[Maker, ...] = (
     kink,
     inversion,
     regularization,
+    consistency,
     identifiability,
     scaling,
 )
