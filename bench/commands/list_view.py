@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from textwrap import wrap
 from typing import Any
@@ -53,11 +54,21 @@ def _described(options: list[tuple[str, str]], width: int) -> Iterator[str]:
     for option, help in options:
         lines = wrap(help, max(width - column, 20)) or [""]
         if len(option) > column - 2:
-            yield option
+            yield from _broken(option, width)
             option = ""
         for line in lines:
             yield f"{option:<{column}}{line}".rstrip()
             option = ""
+
+
+def _broken(option: str, width: int) -> list[str]:
+    """An option in lines of at most `width`, broken between its choices."""
+    lines = [""]
+    for part in re.split(r"(?=\|)", option):
+        if len(lines[-1]) + len(part) > width:
+            lines.append("      ")
+        lines[-1] += part
+    return lines
 
 
 def _summary(target: Any) -> str:
