@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import importlib.util
 import sys
@@ -50,6 +49,8 @@ def _module(where: str, text: str) -> ModuleType:
 @cache
 def _of_file(path: Path) -> ModuleType:
     """The module of a file, run once however often it is named."""
+    import hashlib  # OpenSSL with it: `routes --help` starts without
+
     name = f"_routes_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import Distribution, EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint
 from typing import Any, Literal
 
 from gradient_routes.bench.cases.column import Table
@@ -13,6 +13,7 @@ from gradient_routes.bench.cases.imported import imported, is_reference
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.entry_points import group, is_built_in
 
 Kind = Literal["problem", "route", "study"]
 GROUPS = {"problem": "gradient_routes.problems", "route": "gradient_routes.routes", "study": "gradient_routes.studies"}
@@ -67,7 +68,11 @@ class Entry:
         if self.kind == "study":
             if not (isinstance(target, Study) and target.name == self.name):
                 raise InputError(f"study '{self.name}' of {self.origin} is no Study of that name - register one")
-            target.check(self.origin)
+            if odd := target.odd_name():
+                raise InputError(
+                    f"study '{self.name}' of {self.origin}: a table or column cannot be named '{odd}'"
+                    f" - choose another name"
+                )
         return target
 
     @property
@@ -93,8 +98,8 @@ def distribution_name(distribution: Distribution) -> str:
 @cache
 def registered(kind: Kind) -> list[Entry]:
     """All entries of a kind, built-ins first."""
-    found = [Entry(kind, point) for point in entry_points(group=GROUPS[kind])]
-    return sorted(found, key=lambda e: (e.origin != BUILT_IN, *place(e.name)))
+    points = sorted(group(GROUPS[kind]), key=lambda point: (not is_built_in(point), *place(point.name)))
+    return [Entry(kind, point) for point in points]
 
 
 def place(name: str) -> tuple[int, str]:

@@ -13,7 +13,6 @@ from importlib import import_module
 from typing import Any
 
 from gradient_routes.bench.cases.column import Row, Table
-from gradient_routes.problems.errors import InputError
 
 Options = dict[str, Any]
 RESERVED = ("cases", "samples", "environments", "studies", "study_id")  # tables and the key of every store
@@ -97,14 +96,10 @@ class Study:
     confined: bool = True
     plots: bool = True
 
-    def check(self, origin: str) -> None:
-        """Raises InputError for names of tables and columns that a store cannot have."""
+    def odd_name(self) -> str | None:
+        """The first table or column that a store cannot have under its name."""
         names = [*self.tables, *(column.name for table in self.tables.values() for column in table.columns)]
-        odd = [name for name in names if not name.isidentifier() or name in RESERVED]
-        if odd:
-            raise InputError(
-                f"study '{self.name}' of {origin}: a table or column cannot be named '{odd[0]}' - choose another name"
-            )
+        return next((name for name in names if not name.isidentifier() or name in RESERVED), None)
 
     def load(self, part: str) -> Callable[..., Any] | None:
         """The function behind `run`, `view`, `json`, `figures` or `command`; None where the study has none."""

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gradient_routes.routes.entry_points import group
+
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
@@ -17,12 +19,9 @@ class Selector(click.types.StringParamType):
         self.group = group
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-
-        from importlib.metadata import entry_points
-
         from click.shell_completion import CompletionItem
 
-        names = {point.name for point in entry_points(group=self.group)} | ({"all"} if param.multiple else set())
+        names = {point.name for point in group(self.group)} | ({"all"} if param.multiple else set())
         matching = [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
         return matching or [CompletionItem(incomplete, type="file")]
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING
 
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.entry_points import group, is_built_in
 
 if TYPE_CHECKING:
     from gradient_routes.routes.solvers.solver import LinearSolver
@@ -21,10 +22,10 @@ def points() -> dict[str, EntryPoint]:
     """Entry points by name: the default, then the built-in ones, then plug-ins; of two with one name the first."""
 
     def place(point: EntryPoint) -> tuple[bool, bool, str]:
-        return point.name != DEFAULT, point.dist is None or point.dist.name != BUILT_IN, point.name
+        return point.name != DEFAULT, not is_built_in(point), point.name
 
     found: dict[str, EntryPoint] = {}
-    for point in sorted(entry_points(group=GROUP), key=place):
+    for point in sorted(group(GROUP), key=place):
         found.setdefault(point.name, point)
     return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -93,9 +94,12 @@ def test_an_exit_code_that_a_shell_cannot_have_is_refused(trial) -> None:
     assert (ran.code, "returned 256" in ran.err) == (1, True)
 
 
-@pytest.mark.parametrize("name", ["cases", "my-table", "studies"])
-def test_names_that_a_store_cannot_have_are_refused(name: str) -> None:
-    with pytest.raises(InputError, match=f"cannot be named '{name}'"):
-        Study("trial", "?", {name: TABLES["measured"]}).check("mine")
-    with pytest.raises(InputError, match="cannot be named 'study_id'"):
-        Study("trial", "?", {"t": Table((Column("study_id", "TEXT", "", ""),))}).check("mine")
+@pytest.mark.parametrize(
+    ("odd", "tables"),
+    [(name, {name: TABLES["measured"]}) for name in ("cases", "my-table", "studies")]
+    + [("study_id", {"t": Table((Column("study_id", "TEXT", "", ""),))})],
+)
+def test_names_that_a_store_cannot_have_are_refused(odd: str, tables: dict[str, Table]) -> None:
+    point = SimpleNamespace(name="trial", dist=None, load=lambda: Study("trial", "?", tables))
+    with pytest.raises(InputError, match=f"study 'trial' of trial: a table or column cannot be named '{odd}'"):
+        registry.Entry("study", point).load()
