@@ -14,7 +14,7 @@ from gradient_routes.bench.cases.outcome import Sensitivities, View
 from gradient_routes.bench.cases.partial import Partial
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
-from gradient_routes.bench.execution.references import Found, Judge, Judges
+from gradient_routes.bench.execution.references import Judge, Judges, KnownJudges
 from gradient_routes.bench.execution.sensitivities import check_columns, sensitivities, with_columns
 from gradient_routes.bench.execution.timing import seconds_of
 from gradient_routes.problems.errors import InputError
@@ -49,7 +49,7 @@ class CaseContext:
     `found` are references known from before. Raises InputError and DomainError, and what the problem raises.
     """
 
-    def __init__(self, spec: ProblemSpec, settings: Settings, found: Found | None = None) -> None:
+    def __init__(self, spec: ProblemSpec, settings: Settings, found: KnownJudges | None = None) -> None:
         self.spec, self.settings = spec, settings
         self.problem: Problem
         self.build_s, self.problem = seconds_of(spec)

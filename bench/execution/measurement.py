@@ -24,7 +24,7 @@ from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
-from gradient_routes.bench.execution.references import Found, Judge, norm2
+from gradient_routes.bench.execution.references import Judge, KnownJudges, norm2
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
@@ -48,7 +48,7 @@ class Measure:
     """
 
     case: Case
-    found: Found
+    found: KnownJudges
     witnesses: tuple[Stamp, ...] = ()
     checked_s: float = 0.0
 

@@ -49,10 +49,10 @@ class Judges:
     """
 
     def __init__(
-        self, model: Model, p: Array, unaffordable: Callable[[Route, int], str | None], found: Found | None = None
+        self, model: Model, p: Array, unaffordable: Callable[[Route, int], str | None], found: KnownJudges | None = None
     ) -> None:
         self.model, self.p, self.unaffordable = model, p, unaffordable
-        self.found: Found = {} if found is None else found
+        self.found: KnownJudges = {} if found is None else found
 
     def judge(self, route: Route) -> Judge | str:
         """The problem's own reference, or another exact route's gradient, in full where n_p is small and it can be
@@ -142,7 +142,7 @@ class Judges:
 
 
 OWN = "its own reference"
-Found = dict[tuple[str, bool], Judge | str]  # by the name of the judge, and whether it judges the whole
+KnownJudges = dict[tuple[str, bool], Judge | str]  # by the name of the judge, and whether it judges the whole
 
 
 def error(gradient: Array, reference: Reference) -> tuple[float, str]:

@@ -18,7 +18,7 @@ from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.bench.execution.pruning import Pruning, Size
-from gradient_routes.bench.execution.references import Found
+from gradient_routes.bench.execution.references import KnownJudges
 from gradient_routes.bench.execution.survey import sizes
 from gradient_routes.bench.units import now
 
@@ -134,7 +134,7 @@ class Sweep:
     def _jobs(self, problems: Iterable[tuple[ProblemSpec, Size | None]], pruned: list[Outcome]) -> Iterator[Measure]:
         """What is wanted; what is not worth trying goes among the pruned."""
         for problem, size in problems:
-            found: Found = {}
+            found: KnownJudges = {}
             for route in self.routes:
                 case = Case(problem, route, self.settings, self._asked(problem, route))
                 if not self.wanted(case.asked):

@@ -1,4 +1,4 @@
-"""Cases on the workers of a Dask cluster: one at a time on each, on each host where they are timed."""
+"""Cases on the workers of a Dask cluster: one at a time per worker, or per host where they are timed."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from gradient_routes.bench.execution.measurement import Measure
 
 
 class Cluster:
-    """Cases for the workers of a Dask client, which `connect` opens when there is a first case.
+    """An executor on the workers of a Dask client, which `connect` opens for the first case.
 
-    tell(line) gets what the user should know beside the rows. outcomes() raises InputError where a worker has other
-    versions than this machine, Stranded where there is no worker for `patience` seconds.
+    tell(line) receives lines for the user. outcomes() raises InputError if a worker has other versions than this
+    machine, Stranded if there is no worker for `patience` seconds.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class Cluster:
         self._opened = ExitStack()
 
     def outcomes(self, jobs: Iterator[Measure], slots: int, limits: Limits) -> Iterator[Outcome]:
-        """As they come; a job is taken when a worker is free for it. `slots` is of executors on this machine."""
+        """Outcomes as they arrive; a job is taken when a worker is free. `slots` is for executors on this machine."""
         first = next(jobs, None)
         if first is None:
             return
@@ -45,5 +45,5 @@ class Cluster:
             self.close()
 
     def close(self) -> None:
-        """What still runs is cancelled and ends, then the connection does."""
+        """Cancel running cases, then close the connection."""
         self._opened.close()

@@ -1,4 +1,4 @@
-"""The workers of a Dask cluster: who is there, on which host, with which libraries."""
+"""The workers of a Dask cluster, their hosts and the versions of their libraries."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from gradient_routes.bench.cases.status import one_line
 from gradient_routes.bench.execution.cluster.remote import Greeting
 from gradient_routes.problems.errors import InputError
 
-GREETING = 10.0  # [s] in which workers that are there at the start say who they are
+GREETING = 10.0  # [s] for the workers present at the start to report their versions
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Member:
-    """A worker that has said who it is."""
+    """A worker with the same versions as this machine."""
 
     address: str
     greeting: Greeting
 
     def beside(self, other: Member) -> bool:
-        """Whether both are on one host, as far as names and addresses tell."""
+        """Whether both are on one host, by host name or address."""
         mine, others = (urlsplit(member.address).hostname for member in (self, other))
         return mine == others or self.greeting.hostname == other.greeting.hostname
 
 
 class DaskWorkers:
-    """All workers of a client's cluster that may run cases. wake() is called when there is a reason to look again."""
+    """Workers of a cluster that may run cases. wake() is called when look() has something to do."""
 
     def __init__(self, client: Client, timed: bool, tell: Tell, wake: Callable[[], None]) -> None:
         assert client.scheduler is not None
@@ -53,7 +53,7 @@ class DaskWorkers:
         return len(self._members)
 
     def look(self) -> None:
-        """Who is there? Newcomers are asked who they are. Raises InputError where one differs, at the start."""
+        """Update the list; new workers are asked for their versions. Raises InputError if one differs at the start."""
         present = set(self._client.nthreads())
         for address in self._asked.keys() - present:
             self.forget(address)
@@ -69,13 +69,13 @@ class DaskWorkers:
             self._tell_idle()
 
     def forget(self, address: str) -> None:
-        """It is gone; what comes back there is another."""
+        """Remove a worker that has ended; a later one at its address counts as new."""
         self._asked.pop(address, None)
         self._members.pop(address, None)
         self._refused.discard(address)
 
     def free(self, busy: Iterable[Member]) -> Member | None:
-        """One that may have a case beside those that are busy: where cases are timed, none on their hosts."""
+        """A worker that is not busy; where cases are timed, on a host without a busy one. None if there is none."""
         busy = list(busy)
         for member in self._members.values() if self._met else ():
             if member not in busy and not (self._timed and any(member.beside(other) for other in busy)):
@@ -91,9 +91,9 @@ class DaskWorkers:
         try:
             said: Greeting = asked.result(timeout=GREETING)
         except (CancelledError, TimeoutError):
-            self.forget(address)  # gone by now, or to be asked again
+            self.forget(address)  # it has ended, or is asked again
         except Exception as error:
-            self._refuse(address, f"cannot say who it is: {one_line(error)}")
+            self._refuse(address, f"does not report its versions: {one_line(error)}")
         else:
             others = difference(said.environment, environment())
             if others is None:
@@ -102,7 +102,7 @@ class DaskWorkers:
                 self._refuse(address, f"has {others}")
 
     def _refuse(self, address: str, why: str) -> None:
-        """The whole run, at the start; later only what has joined."""
+        """Refuse the run at the start; later leave out this worker only."""
         line = f"Dask worker {address} {why} - install the same there, gradient-routes {versions()['gradient-routes']}"
         if not self._met:
             raise InputError(line)
@@ -123,9 +123,9 @@ class DaskWorkers:
 
 
 def sent(client: Client, address: str, function: str, *arguments: Any) -> Future[Any]:
-    """A function of bench.execution.cluster.remote on this worker, once, or not at all.
+    """Call a function of bench.execution.cluster.remote on this worker, at most once.
 
-    It is sent by its name: an object that a worker, or the scheduler, cannot import would end it.
+    It is sent by name: an object that the worker or the scheduler cannot import would end that process.
     """
     return client.submit(
         eval,
@@ -140,7 +140,7 @@ def sent(client: Client, address: str, function: str, *arguments: Any) -> Future
 
 
 def difference(theirs: Environment, ours: Environment) -> str | None:
-    """What numbers and keys depend on and is another version there, in words."""
+    """Libraries, of those that results depend on, whose versions differ, as text; None if none does."""
     mine, others = (found["versions"] | {"Python": found["python"]} for found in (ours, theirs))
     odd = [f"{name} {others.get(name)} (here {mine[name]})" for name in mine if others.get(name) != mine[name]]
     return ", ".join(odd) or None

@@ -1,4 +1,4 @@
-"""Cases for a crew: sent, taken back, and sent again where the worker was lost."""
+"""Send cases to Dask workers, collect the outcomes, and send again those of lost workers."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from gradient_routes.bench.execution.isolation.signals import Interrupt
 from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.problems.errors import RoutesError
 
-TICK = 0.5  # [s] between two looks at who is there
+TICK = 0.5  # [s] between two updates of the list of workers
 PATIENCE = 60.0  # [s] to wait for a worker
-TRIES = 3  # of a case whose workers are lost
-GATHERING = 10.0  # [s] after which a result that does not come makes one look whether its worker is there
+TRIES = 3  # workers that may be lost with one case
+GATHERING = 10.0  # [s] to wait for a result before its worker is looked for
 Lost = tuple[Member, ...]
 
 
 class Stranded(RoutesError):
-    """There is nobody to run cases any more."""
+    """There is no worker left."""
 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A case on a worker, after others were lost with it."""
+    """A case on a worker, and the workers that were lost with it before."""
 
     job: Measure
     lost: Lost
@@ -45,14 +45,14 @@ class Attempt:
 
     @property
     def record(self) -> Record:
-        """What is known here: its host."""
+        """A record with what is known here: its host."""
         record = Record(self.job.asked)
         record.add({"host": self.member.greeting.hostname})
         return record
 
 
 class Dispatch:
-    """Which worker has which case."""
+    """Assigns cases to workers."""
 
     def __init__(self, client: Client, limits: Limits, timed: bool, tell: Tell, patience: float) -> None:
         self._client, self._limits, self._patience = client, limits, patience
@@ -60,10 +60,10 @@ class Dispatch:
         self._workers = DaskWorkers(client, timed, tell, lambda: self._events.put(None))
         self._attempts: list[Attempt] = []
         self._waiting: list[tuple[Measure, Lost]] = []
-        self._seen = time.monotonic()  # when there was a worker last
+        self._seen = time.monotonic()  # the last time there was a worker
 
     def outcomes(self, jobs: Iterator[Measure]) -> Iterator[Outcome]:
-        """Until there are no more jobs. Raises Stranded."""
+        """Outcomes until there are no more jobs. Raises Stranded."""
         with Interrupt(lambda: self._events.put(None)) as interrupt:
             while self._attempts or self._waiting or self._pull(jobs):
                 self._look()
@@ -74,8 +74,8 @@ class Dispatch:
                 interrupt.heard()
 
     def cancel(self) -> None:
-        """Nobody waits for anything any more."""
-        with suppress(Exception):  # the scheduler may be gone, too
+        """Cancel all cases that are running."""
+        with suppress(Exception):  # the scheduler may have ended, too
             self._client.cancel([attempt.future for attempt in self._attempts])
 
     def _pull(self, jobs: Iterator[Measure]) -> bool:
@@ -89,7 +89,9 @@ class Dispatch:
             self._workers.look()
         except (OSError, TimeoutError) as error:
             scheduler = f"Dask scheduler {self._workers.scheduler}"
-            raise Stranded(f"{scheduler}: gone, with {self._left} - start another, go on with --resume") from error
+            raise Stranded(
+                f"{scheduler}: does not answer, with {self._left} - start another, continue with --resume"
+            ) from error
         if len(self._workers):
             self._seen = time.monotonic()
         elif time.monotonic() > self._seen + self._patience:
@@ -104,35 +106,35 @@ class Dispatch:
         return f"{count} case{'s' * (count != 1)} under way and maybe more to come"
 
     def _send(self, jobs: Iterator[Measure]) -> None:
-        """One case to everyone who may have one."""
+        """Send a case to every free worker."""
         while (member := self._workers.free(attempt.member for attempt in self._attempts)) is not None:
             if not self._waiting and not self._pull(jobs):
                 return
             job, lost = self._waiting.pop(0)
             parcel = packed(shipped(job), self._limits, os.getcwd())
             with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", "Sending large graph")  # references found before go along
+                warnings.filterwarnings("ignore", "Sending large graph")  # the references found before are sent along
                 future = sent(self._client, member.address, "carry", parcel, member.greeting.pid)
             attempt = Attempt(job, lost, member, future)
             self._attempts.append(attempt)
             future.add_done_callback(lambda _, attempt=attempt: self._events.put(attempt))
 
     def _event(self) -> Attempt | None:
-        """A case that has come back, unless something else is to be looked at."""
+        """An attempt that has ended, or None after a tick or a wake-up."""
         with suppress(Empty):
             return self._events.get(timeout=TICK)
         return None
 
     def _take(self, attempt: Attempt | None) -> Iterator[Outcome]:
-        """What came of it; nothing where it is tried again."""
+        """The outcome of an attempt; none if the case is tried again."""
         if attempt not in self._attempts:
-            return  # its worker was lost before
+            return  # it was given up when its worker was lost
         try:
             reply = self._gathered(attempt)
             outcome, found = (None, {}) if reply is None else pickle.loads(reply)
         except (CancelledError, KilledWorker):
             outcome, found = None, {}
-        except Exception as error:  # of Dask or of the worker: the case itself tells in its row
+        except Exception as error:  # of Dask or of the worker: errors of the case itself are in its row
             who = f"{attempt.job.name} on worker {attempt.member.address}"
             outcome, found = attempt.record.failed(error, who), {}
         if outcome is None:
@@ -144,7 +146,7 @@ class Dispatch:
         yield self._signed(outcome, attempt.member, attempt.lost)
 
     def _gathered(self, attempt: Attempt) -> bytes | None:
-        """Raises what happened to it."""
+        """The result, None if its worker was lost. Raises the error of the attempt."""
         while True:
             try:
                 reply: bytes | None = attempt.future.result(timeout=GATHERING)
@@ -158,7 +160,7 @@ class Dispatch:
                 return reply
 
     def _lose(self, attempt: Attempt) -> Iterator[Outcome]:
-        """It is tried elsewhere, or so many times was enough."""
+        """Try the case on another worker, up to TRIES times; then it has crashed."""
         self._attempts.remove(attempt)
         with suppress(Exception):
             attempt.future.cancel()
@@ -171,7 +173,7 @@ class Dispatch:
         yield self._signed(attempt.record.ended(Status.CRASHED, reason), attempt.member, ())
 
     def _signed(self, outcome: Outcome, member: Member, lost: Lost) -> Outcome:
-        """With the machine it comes from, if it does not tell itself, and what was lost on the way."""
+        """The outcome with the environment of its worker, if it has none, and the lost workers in its note."""
         if lost:
             said = f"begun {len(lost) + 1} times, workers were lost: {', '.join(m.address for m in lost)}"
             outcome = replace(outcome, row=outcome.row | {"note": noted(outcome.row["note"], said)})

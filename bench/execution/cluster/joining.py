@@ -1,4 +1,4 @@
-"""Dask clusters: one of somebody's, at its scheduler's address, or one of this machine."""
+"""Connections to Dask clusters: an existing one, by the address of its scheduler, or a local one."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ TIMEOUT = 10.0  # [s] for a scheduler to answer
 
 @contextmanager
 def joined(address: str) -> Iterator[Client]:
-    """A client of the scheduler at `address`. Raises InputError where none answers, or one of another Dask."""
+    """A client of the scheduler at `address`. Raises InputError if none answers, or if its Dask has another version."""
     quiet()
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", VersionMismatchWarning)  # what has to be equal is compared worker by worker
+            warnings.simplefilter("ignore", VersionMismatchWarning)  # DaskWorkers compares the versions that matter
             client = Client(address, timeout=TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         said = " ".join(str(error.__cause__ or error).split())
@@ -41,32 +41,32 @@ def joined(address: str) -> Iterator[Client]:
 
 @contextmanager
 def local(workers: int) -> Iterator[Client]:
-    """A client of so many workers on this machine, gone with it."""
+    """A client of a new cluster of so many workers on this machine, which ends with the client."""
     quiet()
     with (
         LocalCluster(
             n_workers=0,
             threads_per_worker=1,
             host="127.0.0.1",
-            memory_limit=0,  # cases have limits of their own, in processes that Dask does not see
+            memory_limit=0,  # cases have their own limits, in processes unknown to Dask
             dashboard_address="127.0.0.1:0",
             worker_dashboard_address=None,
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, timeout=TIMEOUT, set_as_default=False) as client,
     ):
-        cluster.sync(deaf)
+        cluster.sync(ignore_interrupts)
         cluster.scale(workers)
         yield client
 
 
-async def deaf() -> None:
-    """Ctrl-C in a terminal is for this process to handle: the workers that this thread starts inherit the mask."""
-    resource_tracker.ensure_running()  # it would be started with the first worker, and take off the mask
+async def ignore_interrupts() -> None:
+    """Block SIGINT in workers that this thread starts: only this process handles Ctrl-C in a terminal."""
+    resource_tracker.ensure_running()  # started with the first worker it would unblock the signal
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def quiet() -> None:
-    """What happens to workers is told in rows and in lines of this project."""
+    """Silence Dask's log: rows and messages of this project report what happens to workers."""
     for name in ("distributed", "distributed.client", "tornado"):  # Dask gives each a level
         logging.getLogger(name).setLevel(logging.CRITICAL)

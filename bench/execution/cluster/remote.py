@@ -1,4 +1,4 @@
-"""What runs on a worker of a Dask cluster: who it is, and a case from its start to its end."""
+"""Functions that run on a Dask worker: its versions, and a case from start to end."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from gradient_routes.bench.execution.executors.running import alone
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.units import now
 
-TICK = 0.2  # [s] between two looks whether anybody still waits for the case
+TICK = 0.2  # [s] between two checks that the case is still wanted
 ENDING = (Status.closing, Status.closing_gracefully, Status.closed, Status.failed)
 
 
 @dataclass(frozen=True)
 class Greeting:
-    """Which process a worker is, on which host, with which libraries."""
+    """The process of a worker, its host and the versions of its libraries."""
 
     hostname: str
     pid: int
@@ -37,19 +37,19 @@ class Greeting:
 
 
 def greeting() -> Greeting:
-    """Of this process."""
+    """The Greeting of this process."""
     return Greeting(socket.gethostname(), os.getpid(), environment())
 
 
 def packed(case: ShippedCase, limits: Limits, cwd: str) -> bytes:
-    """For carry; Dask looks into anything but bytes."""
+    """The argument of carry, as bytes: Dask inspects all other types."""
     return pickle.dumps((case, limits, cwd))
 
 
 def carry(parcel: bytes, pid: int) -> bytes | None:
-    """A case in its own process, as everywhere: its outcome and what was found on the way, pickled.
+    """Run a case in its own process. Returns its outcome and the references it found, pickled.
 
-    None from a process other than `pid`: a worker was lost, and another one has its address.
+    None if this process is not `pid`: the worker was lost, and another one has its address.
     """
     if os.getpid() != pid:
         return None
@@ -68,7 +68,7 @@ def carry(parcel: bytes, pid: int) -> bytes | None:
 
 @contextmanager
 def while_wanted(case: Isolated) -> Iterator[None]:
-    """The process of the case ends with the block, or when nobody waits for it any more."""
+    """End the process of the case with the block, or once the scheduler no longer waits for it."""
     worker, over = get_worker(), Event()
     key = worker.get_current_task()
 
@@ -89,6 +89,6 @@ def while_wanted(case: Isolated) -> Iterator[None]:
 
 
 def wanted(worker: Worker, key: Any) -> bool:
-    """Whether the scheduler still wants it, and the worker is there to hand it over."""
+    """Whether the scheduler still waits for the task and the worker can return it."""
     task = worker.state.tasks.get(key)
     return task is not None and task.state == "executing" and worker.status not in ENDING

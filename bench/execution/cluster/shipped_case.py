@@ -1,4 +1,4 @@
-"""A case as it travels to another host."""
+"""A case as it is sent to another host."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.execution.isolation.channel import Channel
     from gradient_routes.bench.execution.measurement import Measure
-    from gradient_routes.bench.execution.references import Found
+    from gradient_routes.bench.execution.references import KnownJudges
 
 
 @dataclass(frozen=True)
 class ShippedCase:
-    """Opened by the process that runs it and by no other: to open it imports the code of problem and route.
+    """Unpickled only by the process that runs it, since that imports the code of problem and route.
 
     parts  problem, route and settings, pickled
     files  that the case reads
@@ -30,7 +30,7 @@ class ShippedCase:
     parts: bytes
     files: tuple[str, ...]
     asked: Row
-    found: Found
+    found: KnownJudges
 
     @property
     def name(self) -> str:
@@ -55,7 +55,7 @@ class ShippedCase:
         Measure(case, self.found, witnesses(problem, route, settings.at), checked_s)(channel)
 
     def _check(self, problem: ProblemSpec, route: RouteSpec, at: str) -> float:
-        """The seconds it took. Raises InputError where this host would compute something else."""
+        """The seconds the check took. Raises InputError if files, code or libraries differ on this host."""
         from gradient_routes.bench.cases.keys import content_key
 
         start = time.perf_counter()
@@ -68,7 +68,7 @@ class ShippedCase:
 
 
 def shipped(job: Measure) -> ShippedCase:
-    """A case ready to travel."""
+    """A case to be sent."""
     from gradient_routes.bench.cases.case import files
 
     case = job.case

@@ -29,7 +29,7 @@ from gradient_routes.bench.execution.isolation.messages import (
 from gradient_routes.bench.execution.isolation.stack import where as located
 from gradient_routes.bench.execution.isolation.worker_process import WorkerProcess
 from gradient_routes.bench.execution.measurement import Measure
-from gradient_routes.bench.execution.references import Found
+from gradient_routes.bench.execution.references import KnownJudges
 from gradient_routes.problems.errors import InputError, RoutesError
 
 CaseJob = Measure | ShippedCase
@@ -39,7 +39,7 @@ class Isolated:
     """A case under way in a process of its own; what it has said is known whatever becomes of it."""
 
     def __init__(self, job: CaseJob, limits: Limits, cwd: str | None = None) -> None:
-        self.found: Found = job.found
+        self.found: KnownJudges = job.found
         self.long = False
         self._record = Record(job.asked)
         self._phase = "its start"

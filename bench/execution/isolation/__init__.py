@@ -1,11 +1,11 @@
-"""One protocol for confined work: a job runs in a process of its own, under limits, and reports results at once.
+"""One protocol for confined work: a job runs in its own process, under limits, and sends results as it finds them.
 
-messages  what a job says, and what it is told
-channel         a job, and how it speaks to whoever runs it
+messages        types of messages from a job, and of orders to it
+channel         a job, and its connection to the process that runs it
 worker          the process of a job
-worker_process  the same process, seen by its parent
+worker_process  the same process, as its parent sees it
 run             stream(job, limits): its messages; here(job, take): the same in this process
 process         a process group that is watched, and killed at a limit
-limits, inside  what a process may take, and how it submits to that
-signals, stack  interrupts, and where a process was when it ended
+limits, inside  limits, and those that a process sets on itself
+signals, stack  interrupts, and the stack of a process that was ended
 """

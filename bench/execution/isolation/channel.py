@@ -1,4 +1,4 @@
-"""A job, and how it speaks to whoever runs it."""
+"""A job, and its connection to the process that runs it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gradient_routes.bench.cases.status import Status, one_line, reason_of, stat
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Order, Returned
 from gradient_routes.problems.errors import DomainError, InputError
 
-SAID = "said"  # goes with every message from one process to the other, to tell it from garbage
+SAID = "said"  # marks every message between processes: anything else on the pipe is no message
 
 
 def no_orders() -> Order:
@@ -20,17 +20,17 @@ def no_orders() -> Order:
 
 @dataclass(frozen=True)
 class Channel:
-    """say(message) reports to whoever runs the job, in this process or another; hear() waits for an order."""
+    """say(message) sends to the process that runs the job, which may be this one; hear() waits for an order."""
 
     say: Callable[[Message], None]
     hear: Callable[[], Order] = no_orders
 
 
 class Job(Protocol):
-    """What can be run in a process of its own: picklable, with a name for messages.
+    """A picklable callable that can run in its own process; `name` stands in messages.
 
-    It says what it has as soon as it has it. Where it is to end early KeyboardInterrupt is raised in it: it may still
-    say what it has, and raises KeyboardInterrupt again.
+    It sends each result as soon as it has it. To end it early KeyboardInterrupt is raised in it: it may still send
+    what it has, and raises KeyboardInterrupt again.
     """
 
     @property
@@ -41,7 +41,7 @@ class Job(Protocol):
 
 @dataclass(frozen=True)
 class Call:
-    """function(*arguments). Says what it returned."""
+    """Calls function(*arguments) and sends what it returns."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
@@ -55,14 +55,14 @@ class Call:
 
 
 def ended(job: Job, channel: Channel) -> Ended:
-    """Do the job, and say how it ended. The one place where what a job raises becomes a status."""
+    """Do the job; how it ended. The only place where an exception of a job becomes a status."""
     try:
         job(channel)
     except KeyboardInterrupt:
         return Ended(Status.INTERRUPTED)
     except (InputError, DomainError) as error:
         return Ended(Status.REFUSED, str(error), traceback=_formatted(error))
-    except BaseException as failure:  # whatever code of others raises
+    except BaseException as failure:  # user code may raise anything
         status = status_of(failure)
         reason = one_line(failure) if status.todo else reason_of(failure, job.name)
         return Ended(status, reason, traceback=_formatted(failure))

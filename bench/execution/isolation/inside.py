@@ -1,4 +1,4 @@
-"""What a confined process does to itself first."""
+"""Limits that a confined process sets on itself before it starts its job."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ PR_SET_PDEATHSIG = 1  # of Linux' prctl
 
 
 def submit_to(limits: Limits, parent: int) -> None:
-    """Die with the parent, be the first the system kills for memory, allocate within the cap, stay on the processors.
+    """End with the parent, be the first process killed for memory, cap allocations, bind to the processors.
 
-    Where the system knows no such thing it is left out: the watch from outside holds everywhere.
+    What the system does not offer is left out: the parent's watch works on every system.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:
-            os._exit(1)  # it has died before it could be tied to
+            os._exit(1)  # the parent ended before prctl was called
         with suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
     if limits.memory is not None and os.name == "posix":

@@ -1,4 +1,4 @@
-"""What a process may take: wall time, memory, threads, processors."""
+"""Limits of a process: wall time, memory, threads, processors."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from gradient_routes.problems.errors import InputError
 
 UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "KIB": 2**10, "MIB": 2**20, "GIB": 2**30}
 POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-LEAST = 64 * 2**20  # [byte] an interpreter with NumPy takes more
+LEAST = 64 * 2**20  # [byte] less than an interpreter with NumPy takes
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Of one process and all it starts.
+    """Limits of a process and its descendants.
 
     timeout   wall time [s]
     memory    resident bytes; None: what the machine has
@@ -31,9 +31,9 @@ class Limits:
 
     @property
     def environment(self) -> dict[str, str]:
-        """The variables that set threads, to be there before the libraries are loaded.
+        """Variables that set the number of threads; they are read when the libraries are loaded.
 
-        XLA sizes its pool by NPROC, and has a flag to compute in one thread.
+        XLA takes the size of its pool from NPROC, and has a flag to compute in one thread.
         """
         pools = dict.fromkeys((*POOLS, "NPROC"), str(self.threads))
         one = ["--xla_cpu_multi_thread_eigen=false"] if self.threads == 1 else []
@@ -41,7 +41,7 @@ class Limits:
         return pools | ({"XLA_FLAGS": " ".join(given + one)} if given + one else {})
 
     def pin(self) -> None:
-        """Threads and processors of this very process: by variables where libraries are yet to be loaded."""
+        """Limit threads and processors of this process, by variables for libraries that are not loaded yet."""
         os.environ.update(self.environment)
         if "numpy" in sys.modules:
             from threadpoolctl import threadpool_limits

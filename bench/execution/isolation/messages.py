@@ -1,4 +1,4 @@
-"""What jobs say while they run, and what they are told."""
+"""Messages from jobs, and orders to them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.environment import Environment
     from gradient_routes.bench.cases.outcome import Outcome
-    from gradient_routes.bench.execution.references import Found
+    from gradient_routes.bench.execution.references import KnownJudges
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Ready:
     """
 
     long: bool
-    found: Found
+    found: KnownJudges
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Done:
     """The outcome of a case, and the references it has found."""
 
     outcome: Outcome
-    found: Found
+    found: KnownJudges
 
 
 @dataclass(frozen=True)

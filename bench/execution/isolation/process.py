@@ -1,4 +1,4 @@
-"""A process in a group of its own: watched, and killed with all it started when it takes more than it may."""
+"""A process in its own process group: watched, and killed with its descendants when it exceeds a limit."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.execution.isolation.stack import ASKED, without
 from gradient_routes.bench.units import size
 
-TICK = 0.1  # [s] between two looks at its memory
-GRACE = 5.0  # [s] for the end of what has hung up
-KEPT = 20_000  # bytes of stderr
-LAST = 60  # lines of it
-STACK = None if ASKED is None else (ASKED, 0.2)  # it has so many seconds to write its stack
+TICK = 0.1  # [s] between two checks of its memory
+GRACE = 5.0  # [s] for a process to exit after it has closed its connection
+KEPT = 20_000  # bytes of stderr that are kept
+LAST = 60  # lines of them that are reported
+STACK = None if ASKED is None else (ASKED, 0.2)  # the signal that asks for its stack, and seconds to write it
 EXHAUSTED = (
     *("bad_alloc", "MemoryError", "RESOURCE_EXHAUSTED", "Cannot allocate memory", "Out of memory"),
     "Memory allocation still failed",  # OpenBLAS
@@ -42,9 +42,9 @@ class Killed(Exception):
 class Confined:
     """`python -P -m MODULE ARGUMENTS` under limits.
 
-    watch(until, deadline) waits; kill() ends it and everything it started; stderr is its last lines. `last_words` are
-    a signal it gets at its deadline, and the seconds it then has. Out of reach is what has left its process group and
-    lost its parent, too: a daemon.
+    watch(until, deadline) waits; kill() ends it and its descendants; `stderr` holds its last lines. `last_words` is a
+    signal that is sent at the deadline, and the seconds until the process is killed. A daemon, which has left the
+    process group and has lost its parent, is not reached.
     """
 
     def __init__(
@@ -72,9 +72,10 @@ class Confined:
         self._pump.start()
 
     def watch(self, until: Callable[[float], bool], deadline: float) -> None:
-        """Return once `until(seconds)`, which waits so long at most, says so. Raises Killed at a limit, after killing.
+        """Return once `until(seconds)` is true. Raises Killed after the process was killed at a limit.
 
-        `deadline` is on the clock time.monotonic.
+        until     waits for at most `seconds`
+        deadline  on the clock time.monotonic
         """
         while not until(max(0.0, min(TICK, deadline - time.monotonic()))):
             taken = self._memory() if self.limits.memory is not None else 0
@@ -94,7 +95,7 @@ class Confined:
             self.ended(seconds)
 
     def ended(self, seconds: float) -> bool:
-        """Whether it has, within so many seconds."""
+        """Whether it ends within so many seconds."""
         try:
             self.process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -103,11 +104,11 @@ class Confined:
 
     @property
     def gone(self) -> bool:
-        """Whether it has ended, by now or long ago."""
+        """Whether it has ended."""
         return self.process.poll() is not None
 
     def kill(self) -> None:
-        """SIGKILL to the whole group, and to what left it; once, for its number may be another's afterwards."""
+        """Send SIGKILL to the group and to descendants that left it; once, since the system may reuse its number."""
         with self._killing:
             if self._killed:
                 return
@@ -125,11 +126,11 @@ class Confined:
         self._pump.join(1.0)
 
     def ending(self) -> Ended:
-        """What became of a process that is ending without having said why: its exit code or signal, read."""
+        """How a process ended that sent no Ended: its exit code or signal as a status and a reason."""
         ended = self.ended(GRACE)
         self.kill()  # what it started may still run
         if not ended:
-            return Ended(Status.CRASHED, f"it hung up and was still running {GRACE:g} s later")
+            return Ended(Status.CRASHED, f"it closed its connection and was still running {GRACE:g} s later")
         code = self.process.wait()
         if any(word in self._last_line() for word in EXHAUSTED) and code != -signal.SIGSEGV:
             cap = "" if self.limits.memory is None else f" of {size(self.limits.memory)}"
@@ -143,7 +144,7 @@ class Confined:
 
     @property
     def stderr(self) -> str:
-        """Its last lines so far."""
+        """The last lines written so far."""
         return "\n".join(bytes(self._stderr).decode(errors="backslashreplace").splitlines()[-LAST:])
 
     def _last_line(self) -> str:
@@ -154,7 +155,7 @@ class Confined:
             while piece := os.read(stream.fileno(), 65536):
                 self._stderr = (self._stderr + piece)[-KEPT:]
                 if self._talkative:
-                    with suppress(OSError, ValueError):  # nobody listens: it must go on being read all the same
+                    with suppress(OSError, ValueError):  # stderr is closed here: go on reading, or the process blocks
                         sys.stderr.write(piece.decode(errors="backslashreplace"))
                         sys.stderr.flush()
 
@@ -165,7 +166,7 @@ class Confined:
             return []
 
     def _memory(self) -> int:
-        """Resident bytes of the process and all it started."""
+        """Resident bytes of the process and its descendants."""
         total = 0
         for process in (psutil.Process(self.process.pid), *self._descendants()):
             with suppress(psutil.Error):
@@ -174,7 +175,7 @@ class Confined:
 
 
 def _oom_kills() -> int:
-    """How often this machine has killed for memory; 0 where it does not tell."""
+    """Processes that the system has killed for memory since it started; 0 where it does not count them."""
     try:
         with open("/proc/vmstat") as file:
             return next(int(line.split()[1]) for line in file if line.startswith("oom_kill "))

@@ -16,11 +16,11 @@ GRACE = 5.0  # [s] between an interrupt and the end of a job that does not react
 
 
 def stream(job: Job, limits: Limits, *, echo: bool = True, last_words: float = 0.0) -> Iterator[Message]:
-    """Each message as soon as it is said; the last is Ended, however the job ends.
+    """Yield each message as it arrives; the last is Ended, however the job ends.
 
-    At its limit of time, and at Ctrl-C here, the job is interrupted and has `last_words` s, and GRACE s, to say what it
-    has; then it is killed with all it started. Where it uses too much memory it is killed at once. Ctrl-C does not
-    interrupt who takes a message; a second one does. `echo`: its stderr appears on that of this process.
+    At the time limit the job is interrupted and may send messages for `last_words` s, at Ctrl-C for GRACE s; then it
+    is killed with its descendants. It is killed at once where it uses too much memory. A first Ctrl-C does not
+    interrupt the caller while it handles a message, a second one does. `echo`: copy its stderr to this process.
     """
     with closing(WorkerProcess(job, limits, echo=echo, last_words=last_words)) as line, Interrupt() as interrupt:
         look, message = interrupt.heard, None
@@ -35,13 +35,13 @@ def stream(job: Job, limits: Limits, *, echo: bool = True, last_words: float = 0
 
 
 def nothing() -> None:
-    """Ctrl-C has been heard."""
+    """The look of a job that is being interrupted already."""
 
 
 def here(job: Job, take: Callable[[Message], None]) -> Ended:
-    """The job in this process: take(message) gets each, the last of them, Ended, too. What it raises ends the job.
+    """Do the job in this process, without limits. take(message) receives each message, Ended last.
 
-    Nothing limits it. What the job prints to stdout comes out on stderr, what `take` prints does not.
+    What `take` raises ends the job. stdout of the job goes to stderr, that of `take` does not.
     """
     failures: list[BaseException] = []
 

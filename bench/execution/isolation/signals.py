@@ -1,4 +1,4 @@
-"""Signals that end a process: as KeyboardInterrupt, and where it can be heard."""
+"""Signals that end a process, raised as KeyboardInterrupt at a point that can handle it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-EXPIRED = signal.SIGALRM if hasattr(signal, "SIGALRM") else signal.SIGINT  # the time of a job is over
-STOPS = (signal.SIGINT, signal.SIGTERM, EXPIRED)  # what tells a job to end
+EXPIRED = signal.SIGALRM if hasattr(signal, "SIGALRM") else signal.SIGINT  # sent at the time limit of a job
+STOPS = (signal.SIGINT, signal.SIGTERM, EXPIRED)  # signals that end a job
 
 
 def interruptible() -> None:
-    """SIGINT and SIGTERM raise KeyboardInterrupt in this process, also where it was started with SIGINT ignored, as
-    shells start what runs in the background.
+    """Let SIGINT and SIGTERM raise KeyboardInterrupt in this process, even if it was started with SIGINT ignored, as
+    shells start background jobs.
     """
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -24,7 +24,7 @@ def interruptible() -> None:
 
 @contextmanager
 def blocked(numbers: Iterable[signal.Signals]) -> Iterator[None]:
-    """Processes that this thread starts get these signals once they unblock them."""
+    """Processes that this thread starts receive these signals when they unblock them."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     try:
         yield
@@ -33,11 +33,10 @@ def blocked(numbers: Iterable[signal.Signals]) -> Iterator[None]:
 
 
 class Interrupt:
-    """Within it, in the main thread, what would raise KeyboardInterrupt is noted, for heard() to raise; a second one is
-    raised where it comes.
+    """Delays KeyboardInterrupt in the main thread until heard() is called; a second one is raised at once.
 
-    Raised at once it may come in a finalizer, such as that of Dask's futures, where Python prints and drops it.
-    wake() is called when it comes: by the handler of a signal, so that it must not wait for a lock.
+    Raised in a finalizer, such as that of Dask's futures, it would be printed and dropped by Python. The signal
+    handler calls wake(), which must not wait for a lock.
     """
 
     def __init__(self, wake: Callable[[], None] = lambda: None) -> None:
@@ -57,7 +56,7 @@ class Interrupt:
             signal.signal(self._held.pop(), signal.default_int_handler)
 
     def heard(self) -> None:
-        """Raises KeyboardInterrupt where there was one."""
+        """Raise KeyboardInterrupt if a signal has come."""
         if self._noted:
             raise KeyboardInterrupt
 

@@ -14,14 +14,14 @@ ASKED = signal.SIGUSR1 if hasattr(signal, "SIGUSR1") else None  # to write its s
 
 
 def told() -> None:
-    """From here on this process writes its stack when it crashes, and when it is asked to."""
+    """Let this process write its stack to stderr when it crashes, and at the signal ASKED."""
     faulthandler.enable()
     if ASKED is not None:
         faulthandler.register(ASKED, all_threads=False)
 
 
 def where(stderr: str) -> str:
-    """` at FILE:LINE, FUNCTION` of the innermost call that is no library's; empty where no stack was written."""
+    """` at FILE:LINE, FUNCTION` of the innermost call outside of libraries; empty if no stack was written."""
     begins = BEGINS.search(stderr)
     if begins is None:
         return ""
@@ -33,6 +33,6 @@ def where(stderr: str) -> str:
 
 
 def without(stderr: str) -> str:
-    """What it wrote itself."""
+    """stderr before the stack."""
     begins = BEGINS.search(stderr)
     return stderr if begins is None else stderr[: begins.start()]

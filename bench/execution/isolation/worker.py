@@ -1,4 +1,4 @@
-"""The process of a job: it submits to limits, does the job, says how that ended, and exits.
+"""The process of a job: it sets its limits, does the job, sends Ended, and exits.
 
 python -P -m gradient_routes.bench.execution.isolation.worker DESCRIPTOR
 """
@@ -20,8 +20,9 @@ from gradient_routes.bench.execution.isolation.stack import told
 
 
 class Stop:
-    """KeyboardInterrupt in the job at the first signal to end, and at no later one: a process group may be told as a
-    whole and by its parent, too. A message is sent whole first.
+    """Raises KeyboardInterrupt in the job at the first signal that ends it, after a message that is being sent.
+
+    Later signals are ignored: the group and the parent may send one each.
     """
 
     def __init__(self, connection: Connection) -> None:
@@ -29,7 +30,7 @@ class Stop:
         self._told = self._sending = self._waiting = False
         for number in STOPS:
             signal.signal(number, self._handle)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)  # blocked by who started this: none came too early
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)  # the parent blocked them: none came before the handlers
 
     def send(self, message: Any) -> None:
         self._sending = True
@@ -42,7 +43,7 @@ class Stop:
             raise KeyboardInterrupt
 
     def send_last(self, message: Any) -> None:
-        """Nothing interrupts any more."""
+        """Send a message that no signal interrupts."""
         self._told = True
         self._connection.send((SAID, message))
 
@@ -56,12 +57,12 @@ class Stop:
 
 
 def main(descriptor: int) -> None:
-    """Everything of it."""
-    os.set_inheritable(descriptor, False)  # what a job starts must not hold the line open
+    """Do the job that arrives on a descriptor."""
+    os.set_inheritable(descriptor, False)  # processes that the job starts must not hold the connection open
     told()
-    os.dup2(2, 1)  # what other people's code prints is no message, and no result
+    os.dup2(2, 1)  # stdout of user code goes to stderr
     assert isinstance(sys.stderr, io.TextIOWrapper)
-    sys.stderr.reconfigure(write_through=True, errors="backslashreplace")  # what is printed before a crash is not lost
+    sys.stderr.reconfigure(write_through=True, errors="backslashreplace")  # nothing printed before a crash is lost
     sys.stdout = sys.stderr
     connection = Connection(descriptor)
     limits, parent, sys.path[:] = connection.recv()
@@ -70,7 +71,7 @@ def main(descriptor: int) -> None:
     job = connection.recv()
     stop.send_last(ended(job, Channel(stop.send, connection.recv)))
     sys.stderr.flush()
-    os._exit(0)  # nothing that a plug-in or XLA does at exit is of interest
+    os._exit(0)  # skip exit handlers of plug-ins and XLA
 
 
 if __name__ == "__main__":

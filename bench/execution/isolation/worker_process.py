@@ -1,4 +1,4 @@
-"""A confined process that does a job, seen from the process that started it."""
+"""A confined process that does a job, as its parent sees it."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ WORKER = "gradient_routes.bench.execution.isolation.worker"
 
 
 class WorkerProcess:
-    """A worker doing a job, and the messages it sends. A thread reads them: half a message must stop nobody.
+    """A worker that does a job, and its messages, read by a thread so that an incomplete message blocks nothing else.
 
-    echo        what it writes to stderr appears on this process' stderr as well
-    last_words  seconds it has at its limit of time to say what it has; None: it writes its stack to stderr, and what it
-                says from then on does not count
+    echo        copy its stderr to that of this process
+    last_words  seconds for messages after the time limit; None: the worker writes its stack to stderr instead, and
+                later messages are dropped
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class WorkerProcess:
                 cwd=cwd,
                 stdin=subprocess.DEVNULL,
             )
-        with suppress(OSError):  # it is gone: hearing will tell
+        with suppress(OSError):  # it has ended: hear() reports that
             self.connection.send((limits, os.getpid(), sys.path))
             self.connection.send(job)
         self._heard: SimpleQueue[Any] = SimpleQueue()
@@ -60,7 +60,7 @@ class WorkerProcess:
         self._listening.start()
 
     def hear(self, look: Callable[[], None] = lambda: None) -> Message:
-        """Its next message, Ended when there are no more. What `look`, called now and then, raises is raised."""
+        """Its next message, Ended when there are no more. `look` is called while waiting; what it raises is raised."""
         if self._ended is None:
             start = time.monotonic()
             try:
@@ -76,16 +76,16 @@ class WorkerProcess:
                 self._ended = self.process.ending()
             else:
                 return self._message
-        self.close()  # now all it has said has come, and all of its stderr
+        self.close()  # every message and all of stderr have arrived by now
         return self._rest()
 
     def say(self, order: Order) -> None:
-        """A dead worker is found out when it is heard."""
+        """Send an order; that the worker has ended is reported by hear()."""
         with suppress(OSError):
             self.connection.send(order)
 
     def interrupt(self, seconds: float) -> None:
-        """It has so many seconds to say what it has, which is still to be heard; Ctrl-C ends them."""
+        """Interrupt the job. It may send messages for so many seconds, or until Ctrl-C; hear() returns them."""
         self._ended, self._all_counts = Ended(Status.INTERRUPTED, killed=True), True
         with suppress(OSError):
             self.process.process.send_signal(signal.SIGINT)
@@ -93,8 +93,8 @@ class WorkerProcess:
             self.process.ended(seconds)
 
     def close(self) -> None:
-        """Whatever it and its children are at, it ends; who listens does before the line's descriptor is given away,
-        or it would read on from the next that gets it.
+        """Kill the process and its descendants, end the thread, then close the connection: a thread that still reads
+        would read from the next file that gets the descriptor.
         """
         self.process.kill()
         self._hang_up()
@@ -102,18 +102,18 @@ class WorkerProcess:
         self.connection.close()
 
     def _rest(self) -> Message:
-        """What it said that was not heard yet, where it counts, then the end."""
+        """The next message that was not returned yet, where later messages count, else Ended."""
         assert self._ended is not None
         while self._all_counts and not self._heard.empty():
             message = self._heard.get()
             if isinstance(message, Ended):
-                self._ended = replace(self._ended, killed=False)  # at its limit, or interrupted, it has ended by itself
+                self._ended = replace(self._ended, killed=False)  # it ended by itself after the limit or the interrupt
             elif message is not None:
                 return message
         return replace(self._ended, stderr=self.process.stderr)
 
     def _listen(self) -> None:
-        """None for what is no message: its end, half a message, or one that cannot be read here."""
+        """Queue its messages, then None: at its end, at an incomplete message, at one that cannot be unpickled."""
         message: Message = ()
         while message is not None:
             try:
@@ -124,10 +124,10 @@ class WorkerProcess:
             self._heard.put(message)
 
     def _came(self, seconds: float, look: Callable[[], None]) -> bool:
-        """Whether a message has, within so many seconds."""
+        """Whether a message arrives within so many seconds."""
         look()
         if self.process.gone:
-            self._hang_up()  # a child it has left behind may hold the line open: who listens gets what is on it yet
+            self._hang_up()  # a child of it may hold the connection open; what was sent is still read
         try:
             self._message = self._heard.get(timeout=seconds)
         except Empty:
@@ -135,6 +135,6 @@ class WorkerProcess:
         return True
 
     def _hang_up(self) -> None:
-        """Nothing more will come, whoever holds the other end."""
+        """Shut the connection down, whichever processes hold its other end."""
         with suppress(OSError), socket.fromfd(self.connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as line:
             line.shutdown(socket.SHUT_RDWR)

@@ -67,11 +67,11 @@ class BreakEven:
         return dict(vars(self))
 
 
-Found = tuple[list[BreakEven], str | None]  # and why there are none
-Racing = Callable[[Sizes, Sequence[Series], Settings], Found]
+BreakEvens = tuple[list[BreakEven], str | None]  # and why there are none
+Racing = Callable[[Sizes, Sequence[Series], Settings], BreakEvens]
 
 
-def break_even(sizes: Sizes, every: Sequence[Series], settings: Settings) -> Found:
+def break_even(sizes: Sizes, every: Sequence[Series], settings: Settings) -> BreakEvens:
     """Let the routes of PAIRS among `every` race on the largest problem that is affordable."""
     runners: dict[str, RouteSpec] = {}
     for series in every:

@@ -14,8 +14,7 @@ from gradient_routes.bench.cases.case import ProblemSpec
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.cases.study import Found as Result
-from gradient_routes.bench.cases.study import Kept, Say
+from gradient_routes.bench.cases.study import Found, Kept, Say
 from gradient_routes.bench.command_options import checked, debugging, refuse_given
 from gradient_routes.bench.execution.executors.isolated import called
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -25,7 +24,7 @@ from gradient_routes.bench.render.terminal.tables import titled
 from gradient_routes.bench.sanitize import plain
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.options import routes_of
-from gradient_routes.bench.studies.scaling.break_even import Found, Racing, break_even
+from gradient_routes.bench.studies.scaling.break_even import BreakEvens, Racing, break_even
 from gradient_routes.bench.studies.scaling.climbing import Series
 from gradient_routes.bench.studies.scaling.measure import scaling
 from gradient_routes.bench.studies.scaling.sizes import Sizes, sizes
@@ -65,7 +64,7 @@ def run(
     for table, rows in done.tables.items():
         for row in rows:
             say(Kept(table, row))
-    say(Result(done))
+    say(Found(done))
     if lost:
         raise InputError(f"{len(lost)} of {len(done.rows)} cases were not kept: {lost[0]}")
     if done.interrupted:
@@ -73,10 +72,10 @@ def run(
     return 0 if any(row["status"] == "ok" for row in done.rows) else 1
 
 
-def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], settings: Settings) -> Found:
+def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], settings: Settings) -> BreakEvens:
     """The race in a process of its own: what ends it is a reason why there is none."""
     try:
-        found: Found = called(race, (sizes, every, settings), limits)
+        found: BreakEvens = called(race, (sizes, every, settings), limits)
     except RoutesError as ended:
         return [], str(ended)
     return found

@@ -320,7 +320,7 @@ def test_a_host_with_other_files_does_not_answer_for_these(
     ("spoil", "said"),
     [
         (other_version, "has gradient-routes 9.9 (here 0.1.0)"),
-        (no_package, "cannot say who it is: ModuleNotFoundError"),
+        (no_package, "does not report its versions: ModuleNotFoundError"),
     ],
 )
 def test_a_worker_that_differs_is_refused(
@@ -374,7 +374,7 @@ def test_a_scheduler_that_goes_is_told(folder: Path, monkeypatch: pytest.MonkeyP
         going = outcomes(made.address, PATIENCE)
         assert next(going).row["status"] == "ok"
         made.scheduler.kill()
-        with pytest.raises(Stranded, match=f"Dask scheduler {made.address}: gone, with 1 case under way"):
+        with pytest.raises(Stranded, match=f"Dask scheduler {made.address}: does not answer, with 1 case under way"):
             next(going)
         until(lambda: not any(alive(inside) for inside, _ in pids(folder)))
 

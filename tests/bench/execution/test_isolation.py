@@ -131,7 +131,7 @@ def test_what_hangs_up_is_killed_without_a_limit(started: Shell) -> None:
     ran = started.run("run", "--json", "--no-timing", "--problem", faulty(does="hang_up"), "--route", "fd-central")
     (row,) = ran.rows
     assert (ran.code, row["status"]) == (1, "crashed")
-    assert "it hung up and was still running" in row["reason"]
+    assert "it closed its connection and was still running" in row["reason"]
     started.nothing_is_left()
 
 
