@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import compileall
 import gc
 import os
 import sys
@@ -11,13 +12,19 @@ from pathlib import Path
 from typing import Any
 
 # what one test compiles the next loads, commands in processes of their own included; before JAX is imported
-CACHE = Path(__file__).parent.parent / ".pytest_cache" / "jax"
+ROOT = Path(__file__).parent.parent
+CACHE = ROOT / ".pytest_cache" / "jax"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(CACHE))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 # tests compile more than they compute: no optimization, and the emitters that compile in two thirds of the time, which
 # newer versions of jaxlib do not have: they end the process at a flag that they do not know
 EMITTERS = " --xla_cpu_use_fusion_emitters=false" if version("jaxlib").startswith("0.10.") else ""
 os.environ.setdefault("XLA_FLAGS", f"--xla_backend_optimization_level=0{EMITTERS}")
+
+# where Python is to write no bytecode, hundreds of processes would compile the package anew
+if sys.dont_write_bytecode and "PYTEST_XDIST_WORKER" not in os.environ:
+    for folder in ("gradient_routes", "bench", "routes", "problems"):
+        compileall.compile_dir(ROOT / folder, quiet=2)
 
 gc.set_threshold(50_000)  # what JAX traces lives on: looking through it at every 700 objects finds nothing
 
