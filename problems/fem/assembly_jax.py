@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ class JaxAssembly:
 
     def __init__(self, W: Energy) -> None:
         at_points = jax.vmap(W, (0, None))  # over the points of a cell, which share q
-        self._W = jax.vmap(at_points)
+        self._W = jax.jit(jax.vmap(at_points))
         self._A = jax.vmap(jax.vmap(_second_derivative(W), (0, None)))
         self._F = jax.jit(deformation_gradients)
         self._A_dx = jax.jit(self._moduli)
@@ -47,6 +48,12 @@ class JaxAssembly:
     def element_tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, selected: Array) -> Array:
         """Entries `pick` of the element matrices K_(ai)(bj) = sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k)."""
         return element_matrices(np.asarray(self._A_dx(self._F(u_e, dN), q, dx)), dN, selected)
+
+
+@cache
+def assembly(W: Energy) -> JaxAssembly:
+    """One for all solids of a law: what was traced and compiled for one serves the others."""
+    return JaxAssembly(W)
 
 
 def deformation_gradients(u_e: Any, dN: Any) -> Any:

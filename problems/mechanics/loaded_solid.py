@@ -138,9 +138,9 @@ class LoadedSolid:
 
     @cached_property
     def _jax(self) -> JaxAssembly:
-        from gradient_routes.problems.fem.assembly_jax import JaxAssembly
+        from gradient_routes.problems.fem.assembly_jax import assembly
 
-        return JaxAssembly(self.law.W)
+        return assembly(self.law.W)
 
     @cached_property
     def _compiled(self) -> CompiledResidual:
