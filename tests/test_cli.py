@@ -375,7 +375,9 @@ def test_the_first_commands_import_little(code: str, light: str) -> None:
 def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     done = shell("routes run --problem bar --route adjoint --route tangent --min-time 0", tmp_path)
     assert "\x1b" not in done.stdout + done.stderr
-    cut = shell("routes run --json --problem 'bar[n=1|2|3]' --route all --budget 1 | head -1", tmp_path)
+    cut = shell(
+        "routes run --json --problem 'bar[n=1|2|3]' --route adjoint --route tangent --budget 1 | head -1", tmp_path
+    )
     assert "Traceback" not in cut.stderr
 
 

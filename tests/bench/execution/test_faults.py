@@ -226,9 +226,9 @@ def test_no_terminal_is_too_narrow_for_the_numbers(columns: int, tmp_path: Path)
     import pty
 
     leader, follower = pty.openpty()
-    command = [str(Path(sys.executable).with_name("routes")), "run", "--no-store", "--problem", "bar[n=8|1000]"]
+    command = [str(Path(sys.executable).with_name("routes")), "run", "--no-store", "--no-isolate", "--min-time", "0"]
     child = subprocess.Popen(
-        [*command, "--route", "unrolled-ad[iterations=20]", "--route", "adjoint", "--min-time", "0"],
+        [*command, "--problem", "bar[n=8|1000]", "--route", "unrolled-ad[iterations=20]", "--route", "adjoint"],
         stdout=follower, stderr=subprocess.DEVNULL, cwd=tmp_path, env={**os.environ, "COLUMNS": str(columns)},
     )  # fmt: skip
     os.close(follower)

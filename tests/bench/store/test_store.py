@@ -185,7 +185,7 @@ def test_a_store_that_cannot_be_written_is_refused_before_anything_runs(cli) -> 
 
 
 def test_two_processes_write_at_once(tmp_path: Path) -> None:
-    command = [str(Path(sys.executable).with_name("routes")), *RUN]
+    command = [str(Path(sys.executable).with_name("routes")), *RUN, "--no-isolate"]
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     children = [subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) for _ in range(4)]
     assert [child.communicate(timeout=60)[1] for child in children] == [""] * 4
