@@ -24,11 +24,11 @@ def main() -> None:
     """Gradients of PDE-constrained objectives: every route to dJ/dp, what it costs and how wrong it is.
 
     \b
-    routes list                                   problems and routes, with all options
-    routes run --problem bar --route adjoint      one gradient, its cost and its error
+    routes list                                  problems and routes, all options
+    routes run --problem bar --route adjoint     one gradient, its cost and error
     routes run --problem 'bar[n=8|64]' --route all
-    routes vcurve --problem bar --route adjoint   finite differences at every step, and a verdict
-    routes check my_model.py:Model                the same for your own code
+    routes vcurve --problem bar --route adjoint  a verdict, by finite differences
+    routes check my_model.py:Model               the same for your own code
 
     Shell completion: eval "$(_ROUTES_COMPLETE=bash_source routes)" in ~/.bashrc; zsh_source in ~/.zshrc; in
     ~/.config/fish/completions/routes.fish: _ROUTES_COMPLETE=fish_source routes | source
