@@ -45,7 +45,8 @@ class TextTable:
         yield from self._lines([[""] * (height - len(lines)) + lines for lines in head], ["bold"] * len(head), widths)
         for row in self.rows:
             if len(row) == 1:
-                yield row[0]
+                for i, line in enumerate(_folded(row[0].plain, width, WORDS)):
+                    yield Text((2 * INDENT if i else "") + line, style=row[0].style)
                 continue
             cells = [_folded(cell.plain, w, FOLDS) for cell, w in zip(row, widths, strict=True)]
             if cell_len(row[0].plain) > widths[0]:
@@ -91,7 +92,7 @@ def _longest(text: str, folds: re.Pattern[str]) -> int:
     return max(cell_len(piece.rstrip()) for line in text.split("\n") for piece in folds.split(line))
 
 
-def _folded(text: str, width: int, folds: re.Pattern[str]) -> list[str]:
+def _folded(text: str, width: float, folds: re.Pattern[str]) -> list[str]:
     """Lines of at most `width` where folds allow it; a line break stays one."""
     lines: list[str] = []
     for part in text.split("\n"):

@@ -32,22 +32,20 @@ def test_columns_are_as_wide_as_their_cells() -> None:
 
 
 def test_a_long_label_gets_a_line_of_its_own_before_cells_are_folded() -> None:
-    assert lines(46)[3:] == [
+    assert lines(46)[2:] == [
+        "a title that is longer than every row of the",
+        "    table below it, and spans the columns",
         "  adjoint           1.06 1 fwd + 1 adj",
         "  unrolled-ad[inner=direct]",
         "                      12 1 fwd + 12 adj + 3 mv",
     ]
-    assert (
-        lines(38)[3:]
-        == [
-            "  adjoint           1.06 1 fwd + 1 adj",
-            "  unrolled-ad[inner=direct]",
-            "                      12 1 fwd",
-            "                         + 12 adj",
-            "                         + 3 mv",
-        ]
-        or max(map(len, lines(38)[3:])) <= 38
-    )
+    assert lines(38)[-5:] == [
+        "  adjoint           1.06 1 fwd + 1 adj",
+        "  unrolled-ad[inner=direct]",
+        "                      12 1 fwd",
+        "                         + 12 adj",
+        "                         + 3 mv",
+    ]
 
 
 def test_no_number_is_folded() -> None:
