@@ -198,6 +198,11 @@ def invert(
 
     _choice("invert: optimizer", optimizer, Name)
     _choice("invert: positive", positive, Positive)
+    if iterations < 1 or not 0.0 <= tolerance < 1.0 or not 0.0 < rate < float("inf"):
+        raise InputError(
+            f"invert: iterations={iterations}, tolerance={tolerance:g}, rate={rate:g} - give at least one iteration, a"
+            " tolerance below 1 and a rate > 0"
+        )
     engine = Engine(optimizer, Limits(iterations, tolerance, rate), solver_of(**solver), positive)
     return minimize(_one(_problems(problem), problem), _one(_routes(route), route), engine, at)
 
@@ -261,7 +266,8 @@ def _distinct(specs: Iterable[Spec], code_of: Callable[[Spec], Any]) -> list[Spe
         if same is None:
             found.append(spec)
         elif code_of(same) is not code_of(spec):
-            raise InputError(f"run: two are named '{spec.name}' - give each a name of its own")
+            kind = "problems" if isinstance(spec, ProblemSpec) else "routes"
+            raise InputError(f"{kind}: two are named '{spec.name}' - give each a name of its own")
     return found
 
 

@@ -165,7 +165,7 @@ def test_solver_options_reach_the_solver() -> None:
     [
         (lambda: run("bra"), "no problem 'bra' - did you mean 'bar'?"),
         (lambda: run("bar", "adjoin"), "did you mean 'adjoint'?"),
-        (lambda: run([Bar(n=2), Bar(n=3)]), "two are named 'bar' - give each a name of its own"),
+        (lambda: run([Bar(n=2), Bar(n=3)]), "problems: two are named 'bar' - give each a name of its own"),
         (lambda: run(Bar(n=2), store="x.sqlite"), "give problem and route as selectors"),
         (lambda: run("bar", min_time=-1.0), "give seconds >= 0"),
         (lambda: run("bar", budget=0.0), "give seconds > 0"),
@@ -175,6 +175,9 @@ def test_solver_options_reach_the_solver() -> None:
         (lambda: vcurve("bar", rtol=2.0), "give 0 < rtol < 1"),
         (lambda: invert("bar", optimizer="lbfg"), "did you mean 'lbfgs'?"),
         (lambda: invert("bar", positive="lg"), "did you mean 'log'?"),
+        (lambda: invert("bar", iterations=0), "iterations=0, tolerance=1e-08, rate=0.1 - give at least one iteration"),
+        (lambda: invert("bar", tolerance=1.0), "a tolerance below 1"),
+        (lambda: invert("bar", rate=float("nan")), "a rate > 0"),
         (lambda: invert("bar", linear_solver="lu"), "--linear-solver lu - "),
         (lambda: identify("bar", noise=-1.0), "give a finite standard deviation > 0"),
         (lambda: Store("nowhere.sqlite").cases(), "no such file"),
