@@ -36,6 +36,20 @@ def say(out: Console, text: str, style: str = "") -> None:
     out.print(Text(text, style=style), soft_wrap=not out.is_terminal)
 
 
+def columns(*heads: str | tuple[str, int | None], gap: int = 1) -> Table:
+    """An empty table. A name is a column of numbers, (name, width) one of text that folds down to that width, (name,
+    None) one of text that does not fold.
+    """
+    table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
+    for head in heads:
+        if isinstance(head, str):
+            table.add_column(head, justify="right", no_wrap=True)
+        else:
+            name, least = head
+            table.add_column(name, overflow="fold", min_width=least, no_wrap=least is None)
+    return table
+
+
 def show(out: Console, table: Table | TextTable) -> None:
     """Print a table at the console's width, folding cells where there is not enough; at worst lines wrap."""
     if isinstance(table, TextTable):

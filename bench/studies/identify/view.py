@@ -15,7 +15,6 @@ from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.studies.identify.identifiability import Identified
 from gradient_routes.bench.studies.identify.measure import Determined
 from gradient_routes.bench.studies.identify.placement import Placement
-from gradient_routes.bench.studies.kink.view import aligned
 
 WIDEST = 100  # columns of a plot
 KINDS = {"seen": "#", "weak": "-", "blind": "o"}
@@ -106,13 +105,10 @@ def elements(one: Identified, width: int) -> Text:
 
 def parameters(one: Identified, rows: Sequence[Row]) -> Table:
     """One line a parameter, both ends where there are many."""
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    out.add_column("p", no_wrap=True)
     axes = [axis for axis in "xyz" if rows[0][axis] is not None]
     prior = any(row["prior_sd"] is not None for row in rows)
-    for name in [*axes, "|H e|", "null share", "sd", *(["sd before"] if prior else [])]:
-        out.add_column(name, justify="right", no_wrap=True)
-    out.add_column("")
+    before = ["sd before"] if prior else []
+    out = tables.columns(("p", None), *axes, "|H e|", "null share", "sd", *before, ("", None))
     n = len(rows)
     for i in tables.ends(n):
         if i is None:
@@ -130,10 +126,7 @@ def parameters(one: Identified, rows: Sequence[Row]) -> Table:
 
 def experiments(rows: Sequence[Row]) -> Table:
     """One line an experiment, the first being what the others are compared with."""
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    out.add_column("experiment", overflow="fold", min_width=14)
-    for name in ("data", "n_p", "noise", "rank", "blind", "weak", "gained"):
-        out.add_column(name, justify="right", no_wrap=True)
+    out = tables.columns(("experiment", 14), "data", "n_p", "noise", "rank", "blind", "weak", "gained")
     for row in rows:
         cells = [str(row["data"]), str(row["n_param"]), number(row["sigma"], 2)]
         cells += [str(row[name]) for name in ("rank", "blind", "weak")]
@@ -156,12 +149,9 @@ def bought(rows: Sequence[Row]) -> str:
 def proposal(placement: Placement, rows: Sequence[Row]) -> Table:
     """The sensors in the order they were chosen."""
     what = "log det(I + H Gamma H^T)" if placement.criterion == "D" else "trace of the covariance"
-    out = aligned("step")
+    out = tables.columns("step", ("sensor", None), what, "rank")
     out.title = Text(f"{len(rows)} of {placement.candidates} sensors, {placement.criterion}-optimal one by one")
     out.title_justify, out.title_style = "left", "bold"
-    out.add_column("sensor", no_wrap=True)
-    for name in (what, "rank"):
-        out.add_column(name, justify="right", no_wrap=True)
     out.add_row("0", "", number(placement.before, 4), "", style="dim")
     for row in rows:
         out.add_row(str(row["step"]), Text(row["sensor"]), number(row["value"], 4), str(row["rank"]))

@@ -11,9 +11,9 @@ from rich.text import Text
 
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal.plot import Series, plot
-from gradient_routes.bench.render.terminal.tables import show
+from gradient_routes.bench.render.terminal.tables import columns, show
 from gradient_routes.bench.studies.kink.rounding import Trade, Traded, width_of
-from gradient_routes.bench.studies.kink.view import WIDEST, aligned
+from gradient_routes.bench.studies.kink.view import WIDEST
 
 EXACTLY = (
     "exact: a stop that does not yield, by a multiplier; the data are the same; dJ/ds by one route, the first exact one"
@@ -76,7 +76,7 @@ def rates(rows: Sequence[Traded]) -> list[str]:
 def traded(rows: Sequence[Traded], rounded: bool) -> Table:
     """One row a variant of the stop."""
     names = ("u_N - gap", "J", "|J - J_exact|", "|dJ/ds - exact|", "d2J/ds2", "Newton steps")
-    table = aligned("width" if rounded else "k_c", *(n for n in names if rounded or n != "d2J/ds2"))
+    table = columns("width" if rounded else "k_c", *(n for n in names if rounded or n != "d2J/ds2"))
     for one in rows:
         varied = f"{width_of(one.stop) if rounded else one.stop.law.k_c:g}"
         if one.reason is not None:

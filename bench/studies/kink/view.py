@@ -9,7 +9,7 @@ from rich.text import Text
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.panel import panel
-from gradient_routes.bench.render.terminal.tables import show
+from gradient_routes.bench.render.terminal.tables import columns, show
 from gradient_routes.bench.studies.kink.event import EXACT, NEAR, Kink, Slope, in_words
 from gradient_routes.bench.studies.kink.rounding import Trade
 
@@ -50,20 +50,9 @@ def show_kink(out: Console, kink: Kink, problem: str, plots: bool = True) -> Non
         out.print(Text(line, style="dim"), soft_wrap=wrap)
 
 
-def aligned(*names: str) -> Table:
-    """Columns of numbers."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    for name in names:
-        table.add_column(name, justify="right", no_wrap=True)
-    return table
-
-
 def sides(kink: Kink) -> Table:
     """One row a route: dJ/ds just beside the event and how wrong the gradient is, there and over the sweep."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("route", overflow="fold", min_width=14)
-    for name in ("dJ/ds left", "dJ/ds right", "error left", "error right"):
-        table.add_column(name, justify="right", no_wrap=True)
+    table = columns(("route", 14), "dJ/ds left", "dJ/ds right", "error left", "error right")
     table.add_column("worst in the sweep", justify="right", overflow="fold", min_width=8)
     for spec in kink.routes:
         left, right = (next(s for s in kink.on(side) if s.route == spec) for side in ("left", "right"))
@@ -80,11 +69,7 @@ def swept(kink: Kink) -> Table:
     """One row a route: dJ/ds at both ends of a sweep without event, and where its gradient is most wrong."""
     solved = [v for v in kink.visits if v.reason is None]
     ends = (solved[0], solved[-1])
-    names = [f"dJ/ds at s = {v.s:g}" for v in ends]
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("route", overflow="fold", min_width=14)
-    for name in (*names, "worst in the sweep", "at s"):
-        table.add_column(name, justify="right", no_wrap=True)
+    table = columns(("route", 14), *(f"dJ/ds at s = {v.s:g}" for v in ends), "worst in the sweep", "at s")
     for spec in kink.routes:
         of = {s.s: s for s in kink.slopes if s.route == spec}
         judged = [s for s in of.values() if s.error is not None]
@@ -129,7 +114,7 @@ def judged(kink: Kink) -> list[str]:
 
 def stencils(kink: Kink) -> Table:
     """Central quotients over the event at decreasing steps."""
-    table = aligned("h / s", "central quotient over it", "off the left", "off the right")
+    table = columns("h / s", "central quotient over it", "off the left", "off the right")
     for one in kink.stencils:
         cells = (f"{one.step:.0e}", number(one.quotient, 6), number(one.off_left, 3), number(one.off_right, 3))
         table.add_row(*cells) if one.reason is None else table.add_row(cells[0], "failed")

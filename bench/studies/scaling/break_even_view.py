@@ -29,11 +29,7 @@ def title(done: Scaling) -> str:
 
 def table(found: Sequence[BreakEven]) -> Table:
     """One line a pair."""
-    out = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-    out.add_column("routes", overflow="fold", min_width=21)
-    out.add_column("break-even n_p", justify="right", no_wrap=True)
-    out.add_column("predicted", justify="right", no_wrap=True)
-    out.add_column("says", overflow="fold", min_width=24)
+    out = tables.columns(("routes", 21), "break-even n_p", "predicted", ("says", 24), gap=2)
     for one in found:
         out.add_row(_pair(one), _fitted(one), number(one.predicted) or "none", Text(one.says))
     return out
@@ -53,10 +49,7 @@ def _fitted(one: BreakEven) -> str:
 
 def lines(found: Sequence[BreakEven]) -> Table:
     """The line of every route: seconds = fixed + each n_p."""
-    out = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-    out.add_column("route", overflow="fold", min_width=14)
-    out.add_column("fixed", justify="right", no_wrap=True)
-    out.add_column("each parameter", justify="right", no_wrap=True)
+    out = tables.columns(("route", 14), "fixed", "each parameter", gap=2)
     both = [(one.route, one.fixed_s, one.each_s) for one in found]
     both += [(one.other, one.other_fixed_s, one.other_each_s) for one in found]
     for route, fixed, each in dict.fromkeys(both):

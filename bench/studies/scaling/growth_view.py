@@ -31,11 +31,7 @@ Cells = tuple[str, str, str, str]
 
 def table(done: Scaling) -> Table:
     """Under the line of each route: time, memory and what else it has, then its work, each in n_u, n_p or k."""
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    out.add_column("route\n  quantity", min_width=14, overflow="fold")
-    out.add_column("grows as", overflow="fold", min_width=34)
-    out.add_column("over", justify="right", no_wrap=True)
-    out.add_column("sizes", overflow="fold", min_width=18)
+    out = tables.columns(("route\n  quantity", 14), ("grows as", 34), "over", ("sizes", 18))
     for growths in _by_route([one for one in done.growths if one.most is not None]):
         first = growths[0]
         title = tables.named("route", {"route": first.route, "route_options": first.route_options})

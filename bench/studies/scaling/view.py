@@ -62,14 +62,9 @@ def _section(out: Console, title: str, table: Table, legend: str = "") -> None:
 
 def bills(done: Scaling) -> Table:
     """One line a case under the line of its route."""
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    out.add_column("route\n  size", overflow="fold", min_width=10)
-    for heading in ("n_u", "n_p", "time", "cost /\nforward\nsolve", "memory"):
-        out.add_column(heading, justify="right", no_wrap=True)
     taped = any(row["tape_bytes"] for row in done.rows)
-    if taped:
-        out.add_column("tape", justify="right", no_wrap=True)
-    out.add_column("work", overflow="fold", min_width=10)
+    heads = ["n_u", "n_p", "time", "cost /\nforward\nsolve", "memory", *(["tape"] if taped else [])]
+    out = tables.columns(("route\n  size", 10), *heads, ("work", 10))
     for series in done.series:
         out.add_row(Text(name(series), style=route_style(series.route.route.name)))
         for spec, row in series.cases:
@@ -92,11 +87,7 @@ def _cells(row: Row, taped: bool) -> Iterator[str]:
 
 def reached(done: Scaling) -> Table:
     """One line a route: the last size it gave a gradient on, and why none beyond."""
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    out.add_column("route", overflow="fold", min_width=14)
-    for heading in ("size", "n_u", "n_p", "time"):
-        out.add_column(heading, justify="right", no_wrap=True)
-    out.add_column("stopped by", overflow="fold", min_width=24)
+    out = tables.columns(("route", 14), "size", "n_u", "n_p", "time", ("stopped by", 24))
     for series in done.series:
         ran = [(spec, row) for spec, row in series.cases if row["status"] == "ok"]
         style = route_style(series.route.route.name)

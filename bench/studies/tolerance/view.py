@@ -88,9 +88,7 @@ def _marks(routes: dict[str, list[Row]]) -> list[str]:
 def table(rows: Sequence[Row]) -> Table:
     """One line a tolerance: what the solves achieved, then the error of every route."""
     routes = by_route(rows)
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    for name in ("tolerance", "residual", "adjoint", "J"):
-        out.add_column(name, justify="right", no_wrap=True)
+    out = tables.columns("tolerance", "residual", "adjoint", "J")
     for name, of in routes.items():
         out.add_column(Text(name), justify="right", overflow="fold", min_width=7, style=route_style(of[0]["route"]))
     for t in dict.fromkeys(swept(row) for row in rows):

@@ -65,11 +65,9 @@ def _series(name: str, mark: str, rows: Sequence[Row], column: str, style: str =
 
 def table(iterates: Sequence[Row]) -> Table:
     """One line an iterate."""
-    out = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     thinned = any(row["checkpoint"] for row in iterates)
-    names = (["checkpoint"] if thinned else []) + ["k", "J", "g", "residual", "tape", "products", "time"]
-    for name in names:
-        out.add_column(name, justify="right", no_wrap=True)
+    first = ["checkpoint"] if thinned else []
+    out = tables.columns(*first, "k", "J", "g", "residual", "tape", "products", "time")
     for row in iterates:
         cells = [str(row["checkpoint"] or "")] if thinned else []
         cells.append(str(row["iterations"]))
