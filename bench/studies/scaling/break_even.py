@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices
 from gradient_routes.bench.studies.judged import said
 from gradient_routes.bench.studies.scaling.climbing import Series
-from gradient_routes.bench.studies.scaling.crossing import FEWEST, CostLine, Crossing, cheaper, crossing, exact, line
+from gradient_routes.bench.studies.scaling.crossing import FEWEST, CostLine, cheaper, crossing, exact, line
 from gradient_routes.bench.studies.scaling.race import MOST_PARAMETERS, NUMBERS, ROUNDS, Race, doublings, race
 from gradient_routes.bench.studies.scaling.sizes import Sizes
 from gradient_routes.bench.units import duration
@@ -35,39 +35,7 @@ LEAST = sum(2 * m + 1 for m in doublings(2 ** (NUMBERS - 1))) + sum(doublings(2 
 LONGER = 20.0  # rounds of a race last so many times --min-time
 
 
-@dataclass(frozen=True)
-class BreakEven:
-    """Two routes, seconds = fixed + each m of both, and where they cross. Fields are columns of its table."""
-
-    problem: str
-    problem_options: dict[str, object]
-    at: str
-    n_state: int
-    n_param: int
-    route: str
-    route_options: dict[str, object]
-    other: str
-    other_options: dict[str, object]
-    fixed_s: float
-    each_s: float
-    other_fixed_s: float
-    other_each_s: float
-    points: int
-    m_largest: int
-    rounds: int
-    break_even: float | None
-    break_even_low: float | None
-    break_even_high: float | None
-    says: str
-    predicted: float | None
-    predicted_says: str
-
-    @property
-    def row(self) -> Row:
-        return dict(vars(self))
-
-
-BreakEvens = tuple[list[BreakEven], str | None]  # and why there are none
+BreakEvens = tuple[list[Row], str | None]  # rows of the table break_even, and why there are none
 Racing = Callable[[Sizes, Sequence[Series], Settings], BreakEvens]
 
 
@@ -108,7 +76,7 @@ def affordable(sizes: Sizes, every: Sequence[Series], budget: float) -> tuple[Pr
 
 def _raced(
     spec: ProblemSpec, runners: Mapping[str, RouteSpec], pairs: Sequence[tuple[str, str]], settings: Settings
-) -> list[BreakEven]:
+) -> list[Row]:
     problem = spec()
     p = point(problem, settings.at)
     runners = {name: _resolved(problem, p, route, settings) for name, route in runners.items()}
@@ -116,43 +84,41 @@ def _raced(
     if len(done.m) < FEWEST:
         return []
     own, _ = prices(Model(problem, settings.solver), p)
-    where = (spec.name, spec.options, settings.at, problem.n_state, len(p))
-    return [compared(where, (runners[a], runners[b]), done, own) for a, b in pairs]
+    where = {"problem": spec.name, "problem_options": spec.options, "at": settings.at}
+    sizes = {"n_state": problem.n_state, "n_param": len(p)}
+    return [where | sizes | compared((runners[a], runners[b]), done, own) for a, b in pairs]
 
 
 def _resolved(problem: Problem, p: Array, spec: RouteSpec, settings: Settings) -> RouteSpec:
     return replace(spec, options=spec.route.resolve(Model(problem, settings.solver), p, **spec.options))
 
 
-def compared(
-    where: tuple[str, dict[str, object], str, int, int], two: tuple[RouteSpec, RouteSpec], done: Race, own: Prices
-) -> BreakEven:
+def compared(two: tuple[RouteSpec, RouteSpec], done: Race, own: Prices) -> Row:
     """Lines through what was measured beside those of the cost model."""
     first, second = two
     names = (first.route.name, second.route.name)
     fitted = (line(done.m, done.seconds[names[0]]), line(done.m, done.seconds[names[1]]))
     declared = (predicted(first, own), predicted(second, own))
-    met: Crossing = crossing(*fitted)
-    return BreakEven(
-        *where,
-        names[0],
-        first.options,
-        names[1],
-        second.options,
-        fitted[0].fixed,
-        fitted[0].each,
-        fitted[1].fixed,
-        fitted[1].each,
-        len(done.m),
-        max(done.m),
-        done.rounds,
-        met.at,
-        met.low,
-        met.high,
-        cheaper(names, fitted, max(done.m)),
-        crossing(*declared).at,
-        cheaper(names, declared, MOST_PARAMETERS),
-    )
+    met = crossing(*fitted)
+    return {
+        "route": names[0],
+        "route_options": first.options,
+        "other": names[1],
+        "other_options": second.options,
+        "fixed_s": fitted[0].fixed,
+        "each_s": fitted[0].each,
+        "other_fixed_s": fitted[1].fixed,
+        "other_each_s": fitted[1].each,
+        "points": len(done.m),
+        "m_largest": max(done.m),
+        "rounds": done.rounds,
+        "break_even": met.at,
+        "break_even_low": met.low,
+        "break_even_high": met.high,
+        "says": cheaper(names, fitted, max(done.m)),
+        "predicted": crossing(*declared).at,
+        "predicted_says": cheaper(names, declared, MOST_PARAMETERS),
+    }
 
 
 def predicted(spec: RouteSpec, own: Prices) -> CostLine:

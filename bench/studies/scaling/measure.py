@@ -15,7 +15,7 @@ from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.isolation.signals import Interrupt
 from gradient_routes.bench.execution.sweep import run
-from gradient_routes.bench.studies.scaling.break_even import BreakEven, Racing, break_even
+from gradient_routes.bench.studies.scaling.break_even import Racing, break_even
 from gradient_routes.bench.studies.scaling.climbing import Climb, Measure, Series
 from gradient_routes.bench.studies.scaling.power_law import FEWEST, Fit, fit
 from gradient_routes.bench.studies.scaling.sizes import Sizes
@@ -57,14 +57,14 @@ class Scaling:
     rows: tuple[Row, ...] = field(repr=False)
     series: tuple[Series, ...] = field(repr=False)
     growths: tuple[Growth, ...] = field(repr=False)
-    break_evens: tuple[BreakEven, ...] = field(repr=False)
+    break_evens: tuple[Row, ...] = field(repr=False)
     no_break_even: str | None = None
     interrupted: bool = False
 
     @property
     def tables(self) -> dict[str, list[Row]]:
         """Those of the study alone: cases have theirs."""
-        return {"scaling_fits": [g.row for g in self.growths], "break_even": [b.row for b in self.break_evens]}
+        return {"scaling_fits": [g.row for g in self.growths], "break_even": [*self.break_evens]}
 
 
 def scaling(
@@ -81,7 +81,7 @@ def scaling(
     """
     climb = Climb(sizes, routes, settings, measure)
     rows: list[Row] = []
-    races: list[BreakEven] = []
+    races: list[Row] = []
     reason, interrupted = None, False
     try:
         for outcome in climb.run():
