@@ -16,6 +16,7 @@ ROOT = Path(__file__).parent.parent
 CACHE = ROOT / ".pytest_cache" / "jax"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(CACHE))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+os.environ.setdefault("JAX_TRACEBACK_IN_LOCATIONS_LIMIT", "0")  # a tenth of what tracing takes
 # tests compile more than they compute: no optimization, and the emitters that compile in two thirds of the time, which
 # newer versions of jaxlib do not have: they end the process at a flag that they do not know
 EMITTERS = " --xla_cpu_use_fusion_emitters=false" if version("jaxlib").startswith("0.10.") else ""

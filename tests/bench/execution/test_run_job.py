@@ -153,7 +153,8 @@ def test_at_its_limit_a_job_hands_over_what_it_has(deaf: bool) -> None:
 
 @pytest.fixture
 def signals() -> Iterator[None]:
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    """The system's handlers, whatever a generator that a failed test has left open would do at a signal."""
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
