@@ -146,3 +146,4 @@ def started(tmp_path: Path) -> Iterator[Shell]:
     yield shell
     for process in shell.alive():
         process.kill()
+        process.wait()  # a zombie would fail the tests that look for children
