@@ -22,7 +22,7 @@ def stream(job: Job, limits: Limits, *, echo: bool = True, last_words: float = 0
     is killed with its descendants. It is killed at once where it uses too much memory. A first Ctrl-C does not
     interrupt the caller while it handles a message, a second one does. `echo`: copy its stderr to this process.
     """
-    with closing(WorkerProcess(job, limits, echo=echo, last_words=last_words)) as line, Interrupt() as interrupt:
+    with Interrupt() as interrupt, closing(WorkerProcess(job, limits, echo=echo, last_words=last_words)) as line:
         look, message = interrupt.heard, None
         while not isinstance(message, Ended):
             try:

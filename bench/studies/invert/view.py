@@ -31,7 +31,7 @@ LEGEND = (
 FIELD = 40  # parameters from which a field on a box is drawn
 COORDINATES = ("x", "y", "z")
 SAME = 1e-6  # of J
-BARS = 12  # characters of the longest bar
+BARS, WIDE = 5, 9  # characters of the longest bar, and of a heading on one line
 
 
 def show(out: Console, found: object, plots: bool = True) -> None:
@@ -39,7 +39,7 @@ def show(out: Console, found: object, plots: bool = True) -> None:
     width = min(out.width, WIDEST)
     match found:
         case Begun(title, truth):
-            out.print(title, style="bold", soft_wrap=True)
+            out.print(title, style="bold", soft_wrap=not out.is_terminal)
             heading(out, truth)
         case Iterate():
             line(out, found)
@@ -59,7 +59,7 @@ def show(out: Console, found: object, plots: bool = True) -> None:
                 out.print(lcurve_view.curve(points, width))
             out.print(lcurve_view.table(points))
             for remark in lcurve_view.remarks(points):
-                out.print(remark, soft_wrap=True)
+                out.print(remark, soft_wrap=not out.is_terminal)
             out.print()
             _estimates(out, best)
         case Trades(trades):
@@ -67,7 +67,7 @@ def show(out: Console, found: object, plots: bool = True) -> None:
                 out.print(lcurve_view.trade_plot(trades, width))
             out.print(lcurve_view.trades(trades))
         case OneShot() | str():
-            out.print(Text(str(found)), soft_wrap=True)
+            out.print(Text(str(found)), soft_wrap=not out.is_terminal)
 
 
 def _estimates(out: Console, found: Inversion) -> None:
@@ -92,18 +92,18 @@ def line(out: Console, step: Iterate) -> None:
     )
     out.print(Text(text))
     if step.says:
-        out.print(Text(f"     {step.says}", style="yellow"), soft_wrap=True)
+        out.print(Text(f"     {step.says}", style="yellow"), soft_wrap=not out.is_terminal)
 
 
 def ended(out: Console, found: Inversion, one_shot: float | None = None) -> None:
     """Why it stopped, and how it stands to the one-shot answer."""
     well = found.end.startswith("converged")
-    out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=True)
-    out.print(Text(found.scaled, style="dim"), soft_wrap=True)
+    out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=not out.is_terminal)
+    out.print(Text(found.scaled, style="dim"), soft_wrap=not out.is_terminal)
     if one_shot is not None:
         above = found.iterates[-1].objective / one_shot - 1.0 if one_shot > 0.0 else 0.0
         stands = "meets the one-shot answer" if above <= SAME else "stays above the one-shot answer"
-        out.print(Text(f"the loop {stands}: J is {above:+.1e} of it away"), soft_wrap=True)
+        out.print(Text(f"the loop {stands}: J is {above:+.1e} of it away"), soft_wrap=not out.is_terminal)
 
 
 def costs(done: Sequence[Inversion]) -> Table:
@@ -140,13 +140,16 @@ def _cost(found: Inversion, level: float) -> str:
 def estimates(found: Inversion) -> Table:
     """Parameter by parameter: start, estimate, truth, the gradient that is left, beside it what the problem shows (of
     the bar the two strains it is the product of); blind ones hatched."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold", title_justify="left")
-    table.title = Text(found.label, style="bold")
-    q = found.made.parameters
-    beside = {name: column for name, column in found.view.columns.items() if name not in COORDINATES}
-    names = ["p", "start", "estimate", *(["truth"] if found.truth is not None else []), "dJ/dp", *beside, ""]
-    for name in names:
-        table.add_column(Text(name), justify="left" if name in ("p", "") else "right")
+    q, beside = found.made.parameters, {k: v for k, v in found.view.columns.items() if k not in COORDINATES}
+    truth = [] if found.truth is None else ["truth"]
+    two_lines = [
+        " ".join(name.split()[:-2]) + "\n" + " ".join(name.split()[-2:]) if len(name) > WIDE else name
+        for name in beside
+    ]
+    table = tables.columns(("p", None), "start", "estimate", *truth, "dJ/dp", *two_lines, ("", None))
+    units = list(dict.fromkeys(map(q.unit_of, range(found.n_param))))
+    table.title_justify, one = "left", units[0] if len(units) == 1 else None
+    table.title = Text(f"{found.label}, p in {one}" if one else found.label, style="bold")
     n, largest = found.n_param, float(np.abs(found.p).max()) or 1.0
     for i in tables.ends(n):
         if i is None:
@@ -155,9 +158,9 @@ def estimates(found: Inversion) -> Table:
         hidden = found.view.blind is not None and bool(found.view.blind[i])
         values = [found.start[i], found.p[i], *([] if found.truth is None else [found.truth[i]]), found.gradient[i]]
         values += [column[i] for column in beside.values()]
-        bar = "/" * BARS + " blind" if hidden else "#" * round(BARS * abs(float(found.p[i])) / largest)
-        label = f"{q.label(i)} [{q.unit_of(i)}]"
-        table.add_row(Text(label), *(f"{v:.6g}" for v in values), bar, style="dim" if hidden else None)
+        bar = "blind" if hidden else "#" * round(BARS * abs(float(found.p[i])) / largest)
+        label = q.label(i) if one else f"{q.label(i)} [{q.unit_of(i)}]"
+        table.add_row(Text(label), *(f"{v:.4g}" for v in values), bar, style="dim" if hidden else None)
     return table
 
 

@@ -20,6 +20,7 @@ COMMANDS = [
     "kink --problem bar[stop=softplus] --route adjoint",
     f"identify --problem {SMALL} --vary sensors=4 --place 2 --criterion A",
     "scaling --problem bar[n=2|4|8] --route adjoint --route tangent --min-time 0",
+    "invert --problem bar --route adjoint",
     "list",
     "--help",
 ]

@@ -377,7 +377,7 @@ def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
         "to reach a misfit of",
         "7 fwd + 7 adj",
         "119 fwd",
-        "//////////// blind",
+        " blind",
         "forward solves",
     ):
         assert words in out
