@@ -82,7 +82,7 @@ def _at_a_second_point(seen: Examination, found: Check) -> Check:
     other.elsewhere = seen.subject.p
     other.readings.append(seen.readings[0])  # its noise: few steps show none
     reading = other.read(line, h)
-    if reading.says == "plateau" and np.array_equal(other.gradient, seen.gradient):
+    if reading.says == "plateau" and not seen.stationary and np.array_equal(other.gradient, seen.gradient):
         there = replace(found, verdict="wrong-gradient", deciding=reading, elsewhere=reading, compared=SAME)
         return replace(messages.explained(there, seen), moved=DIFFERS)
     if seen.stationary or reading.says == "plateau":

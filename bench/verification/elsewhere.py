@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gradient_routes.bench.verification.guarded import Guarded
-from gradient_routes.bench.verification.lines import MARGIN
+from gradient_routes.bench.verification.lines import inward
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
 
@@ -24,8 +24,7 @@ def second_point(subject: Subject, J: Guarded, seed: int) -> Array | None:
 def _moved(subject: Subject, away: float, seed: int) -> Array:
     """Half the way to a bound at most, and away from one that is near."""
     rng, n_p = np.random.default_rng(seed + 3), len(subject.p)
-    w = subject.natural
-    step = away * rng.choice([-1.0, 1.0], n_p) * rng.uniform(0.5, 1.5, n_p) * w
+    sign = np.where(inward(subject), inward(subject), rng.choice([-1.0, 1.0], n_p))
+    step = away * sign * rng.uniform(0.5, 1.5, n_p) * subject.natural
     below, above = subject.p - subject.lower, subject.upper - subject.p
-    step = np.where(below < MARGIN * w, np.abs(step), np.where(above < MARGIN * w, -np.abs(step), step))
     return np.asarray(subject.p + np.clip(step, -0.5 * below, 0.5 * above))

@@ -123,7 +123,7 @@ class Examination:
     def _test_memory(self) -> None:
         """J(p) once more: a J that starts from its last solution differs now, and the difference counts as noise."""
         value = self.J(self.subject.p) if self.J.left() > 2 else self.J_0
-        if value == self.J_0 or not np.isfinite(value) or self.repeated.scatters:
+        if value == self.J_0 or not np.isfinite(value) or self.repeated.scatters or self.repeated.by_gradient:
             return
         if self.J.left() > 2 and self.J(self.subject.p) == self.J_0:
             return  # one value that was another

@@ -41,10 +41,15 @@ def directions(subject: Subject, count: int, seed: int) -> list[Line]:
     """
     rng, n_p = np.random.default_rng(seed), len(subject.p)
     xi = rng.choice([-1.0, 1.0], (count, n_p)) * rng.uniform(0.5, 1.5, (count, n_p))
-    margin = MARGIN * subject.natural
-    xi = np.where(subject.p - subject.lower < margin, np.abs(xi), xi)
-    xi = np.where(subject.upper - subject.p < margin, -np.abs(xi), xi)
+    xi = np.where(inward(subject) > 0.0, np.abs(xi), np.where(inward(subject) < 0.0, -np.abs(xi), xi))
     return [Line(f"random direction {k + 1}", x * subject.natural) for k, x in enumerate(xi)]
+
+
+def inward(subject: Subject) -> Array:
+    """The side (n_p,) to which components on or near a bound move: 1 up, -1 down, 0 either."""
+    below, above = subject.p - subject.lower, subject.upper - subject.p
+    near = np.minimum(below, above) < MARGIN * subject.natural
+    return np.where(near, np.where(below <= above, 1.0, -1.0), 0.0)
 
 
 def by_sensitivity(gradient: Array, natural: Array, count: int) -> list[int]:

@@ -58,7 +58,10 @@ def once(subject: Subject, J: Guarded) -> Repeated:
 
 
 def repeated(subject: Subject, J: Guarded, values: list[float], elsewhere: Array | None) -> Repeated:
-    """After J(p), twice: J has just been asked for elsewhere; now the gradient, J(p), the gradient. Raises Unusable."""
+    """After J(p), twice, and J elsewhere: J(p), J elsewhere, the gradient, J(p), the gradient. Raises Unusable."""
+    before = J(subject.p) if elsewhere is not None else values[0]
+    if elsewhere is not None:
+        J(elsewhere)
     J.account.gradients += 1
     first = gradient_of(subject)
     if not np.isfinite(values).all():
@@ -68,20 +71,16 @@ def repeated(subject: Subject, J: Guarded, values: list[float], elsewhere: Array
     after = J(subject.p)
     J.account.gradients += 1
     again = gradient_of(subject).gradient
-    changed = abs(after - values[0])
     noise = CLEAR * float(np.std(values)) + ROUNDING * abs(values[0])
-    if np.isfinite(after) and changed > noise and J.left() > 1 and J(subject.p) == values[0]:
-        changed = 0.0  # one value that was another
-    if not np.isfinite(after) or changed <= noise:
-        return Repeated(np.array([v for v in (*values, after) if np.isfinite(v)]), first, again)
-    by_calls = _by_calls(subject, J, elsewhere, after)
-    return Repeated(np.array(values), first, again, 0.0 if by_calls else changed, changed if by_calls else 0.0)
+    by_calls, by_gradient = (_changed(value, values[0], noise) for value in (before, after))
+    if by_calls or by_gradient:
+        if J.left() > 1 and J(subject.p) == values[0]:
+            by_calls = by_gradient = 0.0  # one value that was another
+        return Repeated(np.array(values), first, again, 0.0 if by_calls else by_gradient, by_calls)
+    return Repeated(np.array([v for v in (*values, after) if np.isfinite(v)]), first, again)
 
 
-def _by_calls(subject: Subject, J: Guarded, elsewhere: Array | None, before: float) -> bool:
-    """Whether J(p) changes when J is asked for elsewhere, without a gradient."""
-    if elsewhere is None or J.left() < 4:
-        return False
-    J(subject.p)
-    J(elsewhere)
-    return bool(abs(J(subject.p) - before) > ROUNDING * abs(before))
+def _changed(value: float, first: float, noise: float) -> float:
+    """|value - first|, 0 within the noise."""
+    change = abs(value - first)
+    return change if np.isfinite(change) and change > noise else 0.0
