@@ -21,6 +21,10 @@ class NotOffered(RoutesError):
     """A route asked a problem for something it does not offer."""
 
 
+class LostImaginaryPart(RoutesError):
+    """R or J of a problem that offers COMPLEX drops the imaginary part of its arguments."""
+
+
 class SingularMatrix(RoutesError):
     """A matrix that had to be factorized is singular, or not positive definite although it should be."""
 

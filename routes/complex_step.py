@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.problem import Array
+from gradient_routes.routes.imaginary import RELATIVE_STEP, refuse_losses
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, route
-
-RELATIVE_STEP = 1e-30  # its square is far below eps, itself far above the smallest float
+from gradient_routes.routes.route import ForwardWork, Gradient, Offers, Result, Work, route
 
 POLISH = 1  # the imaginary part, a derivative, converges one Newton step after the real part, which is tested
 
@@ -19,14 +18,22 @@ def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
     return forward.full(n_p, polish=POLISH)
 
 
-@route("complex-step", needs=Offers.SOLVE | Offers.COMPLEX, cost=cost)
-def complex_step(model: Model, p: Array) -> Result:
-    """dJ/dp_i = Im J(p + i h e_i) / h,  h = 1e-30 scale_i (1e-30 |p_i| where that is less)."""
-    gradient = np.empty_like(p)
+@route("complex-step", needs=Offers.SOLVE | Offers.COMPLEX, cost=cost, staged=True)
+def complex_step(model: Model, p: Array) -> Gradient:
+    """dJ/dp_i = Im J(p + i h e_i) / h,  h = 1e-30 scale_i (1e-30 |p_i| where that is less).
+
+    R and J are tested first, at a state whose solve is not counted. Raises LostImaginaryPart.
+    """
+    refuse_losses(model.problem, Model(model.problem, model.solver).solve(p).u, p)
     scale = model.parameters.scale
-    for i, h in enumerate(RELATIVE_STEP * np.where(p == 0.0, scale, np.minimum(np.abs(p), scale))):
-        q = p.astype(np.complex128)
-        q[i] += 1j * h
-        J = model.solve(q, polish=POLISH).J
-        gradient[i] = J.imag / h
-    return Result(float(J.real), gradient)
+
+    def gradient(p: Array) -> Result:
+        g = np.empty_like(p)
+        for i, h in enumerate(RELATIVE_STEP * np.where(p == 0.0, scale, np.minimum(np.abs(p), scale))):
+            q = p.astype(np.complex128)
+            q[i] += 1j * h
+            J = model.solve(q, polish=POLISH).J
+            g[i] = J.imag / h
+        return Result(float(J.real), g)
+
+    return gradient

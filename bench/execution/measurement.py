@@ -260,6 +260,8 @@ def _judge(context: CaseContext, route: Route, record: Record, g: Array) -> None
     if not isinstance(judge, Judge):
         record.note(f"{route.name}: error unknown, no reference: {judge}")
         return
+    if judge.instead is not None:
+        record.note(f"{route.name}: {judge.instead}")
     error, reference = judge.error(g)
     record.add({"gradient_error": error, "reference": reference})
     residual = record.known["residual"]

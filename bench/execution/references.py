@@ -10,7 +10,7 @@ import numpy as np
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.execution.slopes import complex_slopes
-from gradient_routes.problems.errors import RoutesError
+from gradient_routes.problems.errors import LostImaginaryPart, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Operator, Reference
 from gradient_routes.problems.subspace import Subspace, directions
 from gradient_routes.routes.model import Model
@@ -26,10 +26,14 @@ RTOL = 1e-13  # forward solves of judges in directions
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges g (n_p,) by a reference, or V^T g where directions V (n_p, m) are given."""
+    """Judges g (n_p,) by a reference, or V^T g where directions V (n_p, m) are given.
+
+    instead  why complex steps did not judge that would have, where R or J loses imaginary parts
+    """
 
     reference: Reference
     V: Operator | None = None
+    instead: str | None = None
 
     @property
     def whole(self) -> Reference | None:
@@ -66,7 +70,7 @@ class Judges:
                 self.found[name, whole] = self._ask(name, whole)
             found = self.found[name, whole]
             if isinstance(found, Judge):
-                return found
+                return replace(found, instead=next((r for r in reasons.values() if isinstance(r, Lost)), None))
             reasons[name] = found
         return ", ".join(filter(None, reasons.values())).replace("; ", ", ")
 
@@ -80,6 +84,8 @@ class Judges:
             if name == OWN:
                 return self._own()
             return self._by_route(registry.find("route", name).load(), whole)
+        except LostImaginaryPart as failure:
+            return Lost(failure)
         except RoutesError as failure:  # a judge that fails is no reason to fail the judged
             return f"{name}: {failure}" if name not in str(failure) else str(failure)
         except Exception as failure:  # nor is one that trips over the code of a plug-in
@@ -139,6 +145,10 @@ class Judges:
         if not np.isfinite(reference.gradient).all():
             return f"{reference.name}: is not finite"
         return Judge(reference, V)
+
+
+class Lost(str):
+    """Why complex steps do not judge: R or J loses imaginary parts."""
 
 
 OWN = "its own reference"

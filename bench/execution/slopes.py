@@ -6,7 +6,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.problem import Array
-from gradient_routes.routes.complex_step import RELATIVE_STEP
+from gradient_routes.routes.imaginary import RELATIVE_STEP, refuse_losses
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State, norm
 from gradient_routes.routes.solvers.solver import Factorization
@@ -19,9 +19,10 @@ SOLVES = 20
 def complex_slopes(model: Model, p: Array, V: Array) -> Array:
     """V^T dJ/dp (m,) for V (n_p, m): Im J(p + i h v) / h, each from the real solution, on the factors of the first.
 
-    Raises NotConverged, SingularMatrix.
+    Raises LostImaginaryPart, NotConverged, SingularMatrix.
     """
     base, factors = model.solve(p, polish=1), None
+    refuse_losses(model.problem, base.u, p)
     scale = model.parameters.scale
     natural = np.where(p == 0.0, scale, np.minimum(np.abs(p), scale))[:, None]
     slopes = np.empty(V.shape[1])
@@ -39,7 +40,7 @@ def _solve_imaginary(model: Model, q: Array, start: State, factors: Factorizatio
         state = model.solve(q, state, factors)
         factors = state.factors
         before, left = left, norm(model.residual(state.u, q).imag)
-        if left <= RTOL * first or (left > 0.5 * before and left <= SOUND * first):
+        if not first or left <= RTOL * first or (left > 0.5 * before and left <= SOUND * first):
             return state
     raise NotConverged(
         f"{model.problem.name}: Im R falls to {left / first:.2g} of its start only - check R_u", state.history

@@ -14,6 +14,7 @@ from gradient_routes.bench.verification.guarded import FOREIGN, one_line
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.forward_work import ForwardWork
+from gradient_routes.routes.imaginary import losses
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, State, norm
 from gradient_routes.routes.route import Result, Route
@@ -69,13 +70,17 @@ def _of_problem(problem: Problem, p: Array, routes: Sequence[Route], solver: Sol
     limit = max(CONVERGED, ASKED * solver.rtol)
     yield Finding("forward residual |R(u, p)| / |R(u_0, p)|", state.residual, limit)
     u, q = _nearby(problem, state)
+    lost = losses(problem, u, q)
+    if Offers.COMPLEX in problem.offers:
+        for name in ("residual", "objective"):
+            yield _claim(f"{name} keeps imaginary parts (COMPLEX)", name not in lost, lost.get(name, ""))
     if Offers.LINEARIZE in problem.offers:
         yield from Factors(problem, u, q).findings()
     yield from _structure(problem, u, q)
     if Offers.TRACE in problem.offers:
         yield from _traced(problem, u, q)
     for route in routes:
-        if route.sound and route.objection(problem) is None:
+        if route.sound and route.objection(problem) is None and not (lost and Offers.COMPLEX in route.needs):
             yield from _declared(problem, p, route, route.defaults, solver)
 
 

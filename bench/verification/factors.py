@@ -2,20 +2,22 @@
 
     dJ/dp = J_p + R_p^T lam,    R_u^T lam = -J_u,    R(u, p) = 0
 
-Derivatives are tested by complex steps where R and J take complex numbers, else by central differences.
+Derivatives are tested by complex steps where R and J take complex numbers and keep their imaginary parts, else by
+central differences.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.problems.problem import Array, Linearization, Offers, Problem
-from gradient_routes.routes.complex_step import RELATIVE_STEP
 from gradient_routes.routes.finite_difference import CENTRAL
+from gradient_routes.routes.imaginary import RELATIVE_STEP, losses
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import norm
 from gradient_routes.routes.route import Result
@@ -45,13 +47,39 @@ def relative(a: Array, b: Array) -> float:
     return float(np.linalg.norm(a - b) / (np.linalg.norm(b) or 1.0))
 
 
+@dataclass(frozen=True)
+class Function:
+    """R or J of (u, p); exact: differentiated by complex steps."""
+
+    f: Callable[[Array, Array], Array]
+    exact: bool
+
+    @property
+    def limit(self) -> float:
+        return EXACT if self.exact else DIFFERENCED
+
+    def __call__(self, u: Array, p: Array) -> Array:
+        dtype = np.result_type(u, p)
+        return self.f(u.astype(dtype), p.astype(dtype))
+
+    def off(self, given: Array, f: Callable[[Array], Array], x: Array, v: Array) -> float:
+        """|given - df/dx v| relative; the least of three steps where differences are central: no one step suits all."""
+        steps = (1.0,) if self.exact else STEPS
+        return min(relative(given, along(f, x, v, self.exact, times)) for times in steps)
+
+
 class Factors:
-    """R_u, R_p, J_u, J_p at a state u and parameters p, tested against R and J."""
+    """R_u, R_p, J_u, J_p at a state u and parameters p, tested against R and J.
+
+    lost  what R and J lose of complex steps, by name: see `losses`
+    """
 
     def __init__(self, problem: Problem, u: Array, p: Array, seed: int = 0) -> None:
         self.problem, self.u, self.p = problem, u, p
-        self.exact = Offers.COMPLEX in problem.offers
-        self.limit = EXACT if self.exact else DIFFERENCED
+        self.lost = losses(problem, u, p)
+        taken = Offers.COMPLEX in problem.offers
+        self.R = Function(problem.residual, taken and "residual" not in self.lost)
+        self.J = Function(problem.objective, taken and "objective" not in self.lost)
         self.lin: Linearization = problem.linearize(u, p)
         rng = np.random.default_rng(seed)
         natural = problem.parameters.natural(p)
@@ -61,52 +89,47 @@ class Factors:
 
     def findings(self) -> Iterator[Finding]:
         """The derivatives that the problem gives, against R and J; the transposes, against what they transpose."""
-        R, J, lin, R_u = self.problem.residual, self.problem.objective, self.lin, self.problem.tangent(self.u, self.p)
+        R, J, lin, R_u = self.R, self.J, self.lin, self.problem.tangent(self.u, self.p)
         v, du, lam = self.v, self.du, self.lam
-        off = self._off(lin.R_p @ v, self._by_p(R), self.p, v)
-        yield self._derivative("dR/dp", off, "R", "" if off <= self.limit else f", {self._column()}")
-        yield self._derivative("R_u", self._off(R_u @ du, self._by_u(R), self.u, du), "R")
-        yield self._derivative("J_u", self._off(np.asarray(lin.J_u @ du), self._by_u(J), self.u, du), "J")
-        yield self._derivative("J_p", self._off(np.asarray(lin.J_p @ v), self._by_p(J), self.p, v), "J")
+        off = self._by_p(R, lin.R_p @ v, v)
+        yield _derivative("dR/dp", off, R, "R", "" if off <= R.limit else f", {self._column()}")
+        yield _derivative("R_u", self._by_u(R, R_u @ du, du), R, "R")
+        yield _derivative("J_u", self._by_u(J, np.asarray(lin.J_u @ du), du), J, "J")
+        yield _derivative("J_p", self._by_p(J, np.asarray(lin.J_p @ v), v), J, "J")
         yield _identity("<lam, R_p v> = <R_p^T lam, v>", lam * (lin.R_p @ v), (lin.R_p.T @ lam) * v)
         yield _identity("<lam, R_u w> = <R_u^T lam, w>", lam * (R_u @ du), (R_u.T @ lam) * du)
 
-    def _by_p(self, f: Callable[[Array, Array], Array]) -> Callable[[Array], Array]:
-        u = self.u.astype(complex) if self.exact else self.u
-        return lambda p: f(u, p)
+    def _by_p(self, f: Function, given: Array, v: Array) -> float:
+        """|given - df/dp v| relative."""
+        return f.off(given, lambda p: f(self.u, p), self.p, v)
 
-    def _by_u(self, f: Callable[[Array, Array], Array]) -> Callable[[Array], Array]:
-        p = self.p.astype(complex) if self.exact else self.p
-        return lambda u: f(u, p)
-
-    def _off(self, given: Array, f: Callable[[Array], Array], x: Array, v: Array) -> float:
-        """|given - df/dx v| relative; the least of three steps where differences are central: no one step suits all."""
-        steps = (1.0,) if self.exact else STEPS
-        return min(relative(given, along(f, x, v, self.exact, times)) for times in steps)
-
-    def _derivative(self, name: str, off: float, of: str, where: str = "") -> Finding:
-        how = "complex step" if self.exact else "central difference"
-        culprit = None if off <= self.limit else name + where
-        return Finding(f"{name} against {how} of {of}", off, self.limit, culprit=culprit)
+    def _by_u(self, f: Function, given: Array, v: Array) -> float:
+        """|given - df/du v| relative."""
+        return f.off(given, lambda u: f(u, self.p), self.u, v)
 
     def _column(self) -> str:
         """The first wrong column of R_p, by bisection, and the factor it is off by."""
-        R = self._by_p(self.problem.residual)
         members: Array = np.arange(len(self.p))
         while len(members) > 1:
             left, right = np.array_split(members, 2)
             v = np.where(np.isin(np.arange(len(self.p)), left), self.v, 0.0)
-            members = right if self._off(self.lin.R_p @ v, R, self.p, v) <= self.limit else left
+            members = right if self._by_p(self.R, self.lin.R_p @ v, v) <= self.R.limit else left
         i = int(members[0])
         e = np.zeros_like(self.p)
         e[i] = 1.0
-        given, wanted = np.asarray(self.lin.R_p @ e), along(R, self.p, e, self.exact)
+        given, wanted = np.asarray(self.lin.R_p @ e), along(lambda p: self.R(self.u, p), self.p, e, self.R.exact)
         name = f"parameter {self.problem.parameters.label(i)}"
         share = float(given @ wanted / (wanted @ wanted or 1.0))
-        if relative(given, share * wanted) <= self.limit:
+        if relative(given, share * wanted) <= self.R.limit:
             return f"{name}, off by the factor {share:.3g}"
-        rows = np.flatnonzero(np.abs(given - wanted) > self.limit * norm(wanted))
+        rows = np.flatnonzero(np.abs(given - wanted) > self.R.limit * norm(wanted))
         return f"{name}, {len(rows)} of {len(given)} rows, first {rows[0] + 1}" if rows.size else name
+
+
+def _derivative(name: str, off: float, f: Function, of: str, where: str = "") -> Finding:
+    how = "complex step" if f.exact else "central difference"
+    culprit = None if off <= f.limit else name + where
+    return Finding(f"{name} against {how} of {of}", off, f.limit, culprit=culprit)
 
 
 def _identity(name: str, left: Array, right: Array) -> Finding:
