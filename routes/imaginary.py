@@ -24,8 +24,7 @@ Function = Callable[[Array], Array]
 def refuse_losses(problem: Problem, u: Array, p: Array) -> None:
     """Raises LostImaginaryPart where `losses` finds one."""
     for name, loss in losses(problem, u, p).items():
-        says = f"complex step lost: {name} {loss} - use no real, abs, conj, float there"
-        raise LostImaginaryPart(f"{problem.name}: {says}")
+        raise LostImaginaryPart(f"{problem.name}: complex step lost: {name} {loss} - use no abs, conj, real, float")
 
 
 def losses(problem: Problem, u: Array, p: Array, seed: int = 0) -> dict[str, str]:
@@ -38,7 +37,8 @@ def losses(problem: Problem, u: Array, p: Array, seed: int = 0) -> dict[str, str
         return {}
     R, J, rng = problem.residual, problem.objective, np.random.default_rng(seed)
     du = rng.standard_normal(len(u)) * (norm(u) or 1.0)
-    dp = rng.choice([-1.0, 1.0], len(p)) * rng.uniform(0.5, 1.5, len(p)) * problem.parameters.natural(p)
+    dp = rng.choice([-1.0, 1.0], len(p)) * rng.uniform(0.5, 1.5, len(p))
+    dp *= np.where(p == 0.0, problem.parameters.scale, np.abs(p))
     found = {}
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", ComplexWarning)
@@ -72,10 +72,8 @@ def _loss(by: str, f: Function, x: Array, v: Array, terms: float) -> str | None:
     except Exception as failure:  # the code of a user may raise anything
         return f"raises {type(failure).__name__} for complex {by}: {' '.join(str(failure).split())}"
     difference, uncertainty = min((_difference(f, x, v, h, terms) for h in STEPS), key=lambda found: found[1])
-    off, size = norm(step - difference), norm(difference) or 1.0
-    if not off > uncertainty:
-        return None
-    return f"drops Im {by} (off differences by {off / size:.2g}, known to {uncertainty / size:.0e})"
+    off = norm(step - difference)
+    return f"drops Im {by}, off a difference by {off / (norm(difference) or 1.0):.2g}" if off > uncertainty else None
 
 
 def _difference(f: Function, x: Array, v: Array, h: float, terms: float) -> tuple[Array, float]:

@@ -239,7 +239,36 @@ def test_a_judge_that_fails_leaves_it_to_the_next() -> None:
     judge = judged(NoComplex(n=300), adjoint)
     assert isinstance(judge, Judge)
     assert judge.reference.name == "tangent in 3 random directions"
-    assert "complex-step: TypeError: only real numbers" in str(judged(NoComplex(n=300), tangent))
+    says = "bar: complex step lost: residual raises TypeError for complex u: only real numbers here"
+    assert says in str(judge.instead)
+    assert says in str(judged(NoComplex(n=300), tangent))
+
+
+class RealObjective(Long):
+    """Its complex steps would convict every route of the same error."""
+
+    def objective(self, u: Array, p: Array, xp=np) -> Array:
+        return super().objective(u, p, xp).real
+
+
+class RealResidual(Long):
+    def residual(self, u: Array, p: Array, xp=np) -> Array:
+        return super().residual(u, p, xp).real
+
+
+@pytest.mark.parametrize("n", [8, 300])
+@pytest.mark.parametrize(("kind", "name"), [(RealObjective, "objective"), (RealResidual, "residual")])
+@pytest.mark.parametrize("route", [adjoint, fd_central, implicit_ad], ids=ids)
+def test_a_complex_step_that_is_lost_convicts_nobody(kind: type[Bar], name: str, n: int, route: Route) -> None:
+    problem = kind(n=n)
+    judge = judged(problem, route)
+    assert isinstance(judge, Judge)
+    assert judge.reference.name == ("tangent" if n == 8 else "tangent in 3 random directions")
+    says = f"bar: complex step lost: {name} drops Im u, off a difference by 1 - use no abs, conj, real, float"
+    assert judge.instead == says
+    p = problem.parameters.start
+    assert judge.error(route.prepare(Model(problem), p)(p).gradient)[0] < 1e-8
+    assert judged(Long(n=n), route).instead is None
 
 
 class BlackBox(Problem):

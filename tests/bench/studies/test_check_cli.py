@@ -278,6 +278,8 @@ class Spring(Problem):
         (("p * u - 1.0", "p * u + u**3 - 1.0"), "R_u"),
         (("return p * u - 1.0", "return (p * u - 1.0)[:1]"), "R (1,): n_state says (2,)"),
         (("return p * u - 1.0", "return np.linalg.nothing"), "AttributeError"),
+        (("(u - 0.3) ** 2", "abs(u - 0.3) ** 2"), "objective keeps imaginary parts (COMPLEX)"),
+        (("return p * u - 1.0", "return p.real * u - 1.0"), "residual keeps imaginary parts (COMPLEX)"),
     ],
 )
 def test_a_broken_promise_is_named(cli, tmp_path: Path, break_it: tuple[str, str], says: str | None) -> None:
@@ -285,6 +287,62 @@ def test_a_broken_promise_is_named(cli, tmp_path: Path, break_it: tuple[str, str
     ran = cli("check", "--problem", "my.py:Spring")
     assert ran.code == (0 if says is None else 1 if "outside" not in says else 2)
     assert (says or "keeps the contract") in ran.out + ran.err
+
+
+CHAIN = """
+import numpy as np
+from gradient_routes.problems.problem import Linearization, Offers, Parameters, Problem
+
+class Chain(Problem):
+    name, structure, n_state = "chain", "spd", 8
+    offers = Offers.LINEARIZE | Offers.COMPLEX
+    D = np.eye(8) - np.eye(8, k=-1)
+    def __init__(self):
+        self.parameters = Parameters(start=np.linspace(1.0, 2.0, 8), scale=np.ones(8), lower=0.0)
+    def residual(self, u, p): return self.D.T @ (p.real * (self.D @ u)) + 0.1 * u**3 - 1.0
+    def tangent(self, u, p): return self.D.T @ np.diag(p) @ self.D + np.diag(0.3 * u**2)
+    def objective(self, u, p): return 0.5 * np.sum((u - 0.3) ** 2)
+    def linearize(self, u, p): return Linearization(self.D.T @ np.diag(self.D @ u), u - 0.3, np.zeros(8))
+"""
+LOST = "chain: complex step lost: residual drops Im p, off a difference by 1 - use no abs, conj, real, float"
+
+
+def test_a_broken_promise_of_complex_steps_is_one_violation(cli, tmp_path: Path) -> None:
+    """All else is tested by differences, and complex steps are not run."""
+    (tmp_path / "my.py").write_text(CHAIN)
+    ran = cli("check", "--problem", "my.py:Chain", "--json")
+    assert ran.code == 1
+    findings = verdict(ran)["findings"]
+    (broken,) = [f for f in findings if f["sound"] is False]
+    assert broken["name"] == "residual keeps imaginary parts (COMPLEX)"
+    assert broken["says"] == "drops Im p, off a difference by 1"
+    names = {f["name"] for f in findings}
+    assert {"dR/dp against central difference of R", "J_u against complex step of J"} <= names
+    assert not any(name.startswith("complex-step:") for name in names)
+    assert any(name.startswith("adjoint:") for name in names)
+
+
+@pytest.mark.parametrize("route", ["adjoint", "fd-central"])
+def test_lost_imaginary_parts_say_nothing_of_a_gradient(cli, tmp_path: Path, route: str) -> None:
+    (tmp_path / "my.py").write_text(CHAIN)
+    ran = cli("check", "--problem", "my.py:Chain", "--route", route, "--json")
+    answer = verdict(ran)
+    assert (ran.code, ran.err, answer["verdict"], answer["next"]) == (0, "", "agrees", "use the gradient")
+    (complex_step,) = [f for f in answer["findings"] if f["name"] == "complex step"]
+    assert (complex_step["sound"], complex_step["says"]) == (None, LOST)
+
+
+def test_rows_are_judged_by_another_and_say_why(cli, tmp_path: Path) -> None:
+    (tmp_path / "my.py").write_text(CHAIN)
+    routes = [part for name in ("adjoint", "fd-central", "complex-step") for part in ("--route", name)]
+    ran = cli("run", "--problem", "my.py:Chain", *routes, "--json")
+    adjoint, differences, refused = ran.rows
+    for row in (adjoint, differences):
+        assert (row["reference"], row["note"]) == ("tangent", f"{row['route']}: {LOST}")
+    assert adjoint["gradient_error"] < 1e-12
+    assert differences["gradient_error"] < 1e-6
+    assert adjoint["work"]["forward_solves"] == 1
+    assert (refused["status"], refused["reason"]) == ("failed", LOST)
 
 
 def test_a_route_of_a_file_is_held_to_its_declared_work(cli, tmp_path: Path) -> None:
