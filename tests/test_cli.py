@@ -119,6 +119,18 @@ def test_gradient_view_shows_strains_and_the_blind(cli) -> None:
     assert "... 1000 more" in run(cli, "--gradient", problem="bar[n=1064]").out
 
 
+@pytest.mark.parametrize(("iterations", "blind"), [(100, "blind*"), (2000, "blind")])
+def test_the_view_says_whether_the_solution_is_blind_or_the_iterate_too(cli, iterations: int, blind: str) -> None:
+    """After 100 iterations of Jacobi's method J depends on the elements behind the last sensor."""
+    route = f"unrolled-ad[inner=jacobi,iterations={iterations}]"
+    lines = cli("run", "--problem", "bar", "--route", route, "--gradient", *QUICK).out.splitlines()
+    marks = [line.rpartition(" ")[2].strip() for line in lines if line.startswith("log E_")]
+    assert marks[5:] == [blind] * 3
+    assert not any("blind" in mark for mark in marks[:5])
+    told = [line for line in lines if line.startswith("* blind for the solution, not for this iterate: |R| / |R_0| =")]
+    assert len(told) == (blind == "blind*")
+
+
 def test_grids_and_repeats_multiply(cli) -> None:
     problems = ("--problem", "bar[n=1|2]", "--problem", "bar[sensors=1,3]")
     ran = cli("run", *problems, "--route", "fd-central[start=cold|warm]", "--route", "adjoint", "--json", *QUICK)

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 from rich.text import Text
 
 from gradient_routes.bench.cases.column import Row
@@ -20,6 +21,7 @@ from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.tables import RESOLUTION, ends, left_out, named, say, titled
 from gradient_routes.bench.render.terminal.text_table import TextTable
+from gradient_routes.problems.problem import Array
 from gradient_routes.routes.tally import Work
 
 HEADINGS = ("problem\n  route", "J", "error", "time", "cost /\nforward\nsolve", "work", "memory", "tape")
@@ -30,6 +32,8 @@ time: one gradient{{}}; cost / forward solve: that time over a forward solve's
 work: {WORK}
 memory: peak of one call; tape: stored by AD for its backward sweep"""
 UNSTABLE = ", ~: unstable"
+FELT = "*"
+SOLVED = 1e-9  # relative residual of a state that is the solution
 OUTPUT_TELLS = ("crashed", "timeout", "out-of-memory")  # statuses of no exception: the end of stderr may say why
 
 
@@ -56,6 +60,9 @@ def show(
         out.print()
         say(out, f"{titled(row)} by {named('route', row)}", "bold")
         tables.show(out, gradient(row, view))
+        if _felt(row, view).any():
+            residual = number(row["residual"], 2)
+            say(out, f"{FELT} blind for the solution, not for this iterate: |R| / |R_0| = {residual}", "dim")
 
 
 def results(rows: Sequence[Row]) -> TextTable:
@@ -144,12 +151,20 @@ def _notes(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
             yield f"note: {named('problem', row)}: {note}", "italic"
 
 
+def _felt(row: Row, view: View) -> Array:
+    """Blind parameters (n_p,) on which J of an iterate that is not the solution depends all the same."""
+    blind = view.columns.blind
+    if blind is None or row["residual"] is None or row["residual"] <= SOLVED:
+        return np.zeros(len(view.gradient), dtype=bool)
+    return np.asarray(blind & (view.gradient != (0.0 if view.reference is None else view.reference.gradient)))
+
+
 def gradient(row: Row, view: View) -> TextTable:
     """A row per parameter: the route's gradient beside the reference and the columns of the problem."""
     columns = {"dJ/dp": view.gradient}
     columns |= {} if view.reference is None else {view.reference.name: view.reference.gradient}
     columns |= view.columns.columns
-    blind = view.columns.blind
+    blind, felt = view.columns.blind, _felt(row, view)
     marks = [] if blind is None else [""]
     units = set(view.units)
     unit = f" [{units.pop()}]" if len(units) == 1 else None  # of all: said once
@@ -163,7 +178,8 @@ def gradient(row: Row, view: View) -> TextTable:
         style = "dim" if hidden else ""
         cells = [Text(f"{values[i]:.6g}", style=style) for values in columns.values()]
         cells[0].style = style or route_style(row["route"])
-        cells += [Text(view.columns.mark if hidden else "", style=style) for _ in marks]
+        mark = f"{view.columns.mark}{FELT if felt[i] else ''}"
+        cells += [Text(mark if hidden else "", style=style) for _ in marks]
         label = view.labels[i] if unit else f"{view.labels[i]} [{view.units[i]}]"
         table.row(Text(label, style=style), cells)
     return table
