@@ -69,17 +69,13 @@ class Function:
 
 
 class Factors:
-    """R_u, R_p, J_u, J_p at a state u and parameters p, tested against R and J.
-
-    lost  what R and J lose of complex steps, by name: see `losses`
-    """
+    """R_u, R_p, J_u, J_p at a state u and parameters p, tested against R and J."""
 
     def __init__(self, problem: Problem, u: Array, p: Array, seed: int = 0) -> None:
         self.problem, self.u, self.p = problem, u, p
-        self.lost = losses(problem, u, p)
-        taken = Offers.COMPLEX in problem.offers
-        self.R = Function(problem.residual, taken and "residual" not in self.lost)
-        self.J = Function(problem.objective, taken and "objective" not in self.lost)
+        lost, taken = losses(problem, u, p), Offers.COMPLEX in problem.offers
+        self.R = Function(problem.residual, taken and "residual" not in lost)
+        self.J = Function(problem.objective, taken and "objective" not in lost)
         self.lin: Linearization = problem.linearize(u, p)
         rng = np.random.default_rng(seed)
         natural = problem.parameters.natural(p)
