@@ -138,7 +138,8 @@ class Examination:
         small, large = sorted((reading.level, other or reading.level), key=lambda a: a.h)
         h = large.h if other is not None else max(large.h, MACRO)
         sigma = tread_noise(self.J, self.subject, reading.quotients.line, h)
-        if sigma is not None and sigma > TREADS * reading.noise and abrupt(reading.quotients, small.value, self.J.eps):
+        ends = small.value, large.value if other is not None else 0.0
+        if sigma is not None and sigma > TREADS * reading.noise and abrupt(reading.quotients, *ends, self.J.eps):
             self.treads = sigma
             self._read_again()
 

@@ -21,6 +21,7 @@ ORDERS = 3  # orders of differences whose noise must be alike
 ALIKE = 4.0  # ratio of noises that are
 THIRD = 3  # order of differences of which a kink changes two, a jump three
 FEW, LEAST = 0.35, 0.5  # quantile of them, and the noises it is at least: 2 where they are normal
+GONE = 0.1
 ABRUPT = 300.0  # growth between two steps of what departs from a slope: a smooth J departs by 10 to 100
 ROUNDINGS = 30.0  # roundings of J below which a departure is none
 
@@ -61,15 +62,18 @@ def _everywhere(values: Array, noise: float) -> bool:
     return bool(np.quantile(third, FEW) >= LEAST * noise)
 
 
-def abrupt(q: Quotients, slope_off: float, eps: float) -> bool:
+def abrupt(q: Quotients, small: float, large: float, eps: float) -> bool:
     """Whether J leaves its slope at small steps at once, on one side at least: smooth J do so by degrees.
 
-    slope_off is that slope less the gradient's.
+    small, large: the slopes at small and at large steps, less the gradient's. Where the quotients have gone a tenth of
+    the way between them the departure of J, which then is their difference times h, is compared with the step before.
     """
     least = ROUNDINGS * eps * abs(q.J) or np.finfo(np.float64).tiny
     for dJ, s in ((q.J_plus - q.J, q.s_plus), (q.J - q.J_minus, q.s_minus)):
-        away = np.abs(dJ / q.h - s - slope_off) * q.h
-        away = away[np.isfinite(away)]
-        if (away[1:] > ABRUPT * np.maximum(away[:-1], least)).any():
+        away = np.abs(dJ / q.h - s - small) * q.h
+        known = np.isfinite(away)
+        away, h = away[known], q.h[known]
+        gone = np.flatnonzero((away >= GONE * abs(large - small) * h) & (away > ABRUPT * least))
+        if gone.size and gone[0] > 0 and away[gone[0]] > ABRUPT * max(away[gone[0] - 1], least):
             return True
     return False

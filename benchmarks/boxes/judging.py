@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
+from multiprocessing import get_context
 
 from benchmarks.boxes.box import Box, Truth
 from benchmarks.boxes.families import FAMILIES
@@ -87,7 +88,7 @@ def judge_all(seeds: int, only: str, jobs: int) -> list[Judged]:
     task = partial(_task, only)
     if jobs == 1:
         return list(chain.from_iterable(map(task, names, numbers)))
-    with ProcessPoolExecutor(jobs) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         return list(chain.from_iterable(pool.map(task, names, numbers, chunksize=4)))
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from commands import ROOT
 
+from benchmarks.boxes import judging
+from benchmarks.boxes.families import FAMILIES
 from benchmarks.confusion import Cell, Judged, built, cells, judge, point
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.verification.check import check
@@ -99,3 +101,14 @@ def test_faulty_routes_are_not_among_all(cli, tmp_path: Path) -> None:
     assert "faulty-adjoint" not in {row["route"] for row in ran.rows}
     assert len(ran.rows) == 7
     assert "faulty-adjoint" in cli("list", "routes").out
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_a_box_of_every_family_is_judged_rightly(part: int) -> None:
+    """Of a seed that the judge was not made with: no wrong gradient is acquitted, no right one convicted."""
+    for k, name in enumerate(FAMILIES):
+        if k % 4 != part:
+            continue
+        boxes = FAMILIES[name].boxes(7)
+        judged = judging.judge(boxes[k % len(boxes)], name, "", 7)
+        assert judged.fault not in ("acquitted", "convicted"), f"{judged.id}: {judged.verdict}: {judged.says}"
