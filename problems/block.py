@@ -165,7 +165,7 @@ class Block(Problem):
         """Neighbours are cells that share a facet, and adjacent layers."""
         kind = phi or ("tikhonov" if unknown in FIELDS else "amplitude")
         f2t = self.mesh.skfem_mesh.f2t
-        pairs = np.asarray(f2t.T[f2t[1] >= 0]) if unknown == "modulus" else None
+        pairs = np.asarray(f2t.T[f2t[1] != -1]) if unknown == "modulus" else None
         prior = Prior(alpha, kind, width, pairs, self.parameters.start, self.parameters.scale)
         if kind == "amplitude" and unknown in FIELDS:
             prior = replace(prior, origin=self._theta(self.parameters.start), scale=1.0)

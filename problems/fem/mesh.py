@@ -117,12 +117,9 @@ def read_mesh(who: str, path: str | Path) -> Mesh:
         raise InputError(
             f"{who}: mesh={path} has points of {np.shape(found.points)[-1]} coordinates - it needs x, y, z"
         )
-    # scikit-fem matches facets by their corners only
-    corners = {"triangle6": ("triangle", 3), "quad8": ("quad", 4), "quad9": ("quad", 4)}
     for block in found.cells:
-        if block.type in corners:
-            block.type, n = corners[block.type]
-            block.data = block.data[:, :n]
+        if block.type == "triangle6":  # scikit-fem matches facets by their corners only
+            block.type, block.data = "triangle", block.data[:, :3]
     skfem_mesh = from_meshio(found, force_meshio_type=kinds[0], ignore_orientation=True)
     mesh = _make_mesh(who, MESHIO_CELLS[kinds[0]], skfem_mesh)
     _check_cells(mesh, path)
@@ -137,7 +134,7 @@ def _check_cells(mesh: Mesh, path: str | Path) -> None:
     det = geometry.determinants()  # (n_e, n_a), at the nodes
     extent = np.ptp(geometry.X[geometry.nodes], axis=1).max(axis=1)[:, None]
     bad = (np.abs(det) <= 1e-12 * extent**3).any(axis=1) | (np.sign(det) != np.sign(det[:, :1])).any(axis=1)
-    inner = np.flatnonzero(skfem_mesh.f2t[1] >= 0)
+    inner = np.flatnonzero(skfem_mesh.f2t[1] != -1)
     corners = skfem_mesh.p[:, skfem_mesh.facets[:, inner]]  # (3, 3 or 4, n_f)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], axis=0)
     centre = skfem_mesh.p[:, skfem_mesh.t].mean(axis=1)

@@ -163,7 +163,7 @@ class Supg:
     @property
     def neighbours(self) -> Array:
         """Pairs of cells that share a side, (n_s, 2)."""
-        return np.asarray(self.mesh.f2t.T[self.mesh.f2t[1] >= 0])
+        return np.asarray(self.mesh.f2t.T[self.mesh.f2t[1] != -1])
 
 
 def on_inflow(x: Array, b: Array) -> Array:

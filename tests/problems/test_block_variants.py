@@ -124,6 +124,37 @@ def test_mesh_files_give_the_body_they_hold(element: str, tmp_path: Path) -> Non
     assert from_meshio(back).p.shape == read.mesh.skfem_mesh.p.shape
 
 
+def test_faces_of_a_quadratic_mesh_are_named_by_quadratic_triangles(tmp_path: Path) -> None:
+    box, path = box_mesh("box", "tet10", (1, 1, 1), (1.0, 1.0, 1.0)), tmp_path / "box.msh"
+    top = box.boundary("top")
+    X, on_top = box.geometry.X, [[a for a in cell if box.geometry.X[a, 2] == 1.0] for cell in top.nodes]
+    name, cells = box.geometry.for_meshio()
+    faces = np.array([sorted(nodes, key=lambda a: (X[a] % 1.0 != 0.0).any()) for nodes in on_top])  # corners first
+    tags = [np.full(len(cells), 1), np.full(len(faces), 2)]
+    named = {"body": np.array([1, 3]), "lid": np.array([2, 2])}  # tag and dimension
+    gmsh = Mesh(X, [(name, cells), ("triangle6", faces)], field_data=named)
+    gmsh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    gmsh.write(path, file_format="gmsh22", binary=False)
+    np.testing.assert_array_equal(read_mesh("block", path).boundary("lid").node_set, top.node_set)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_congruent_cells_share_their_gradients_at_any_scale(size: float) -> None:
+    """Edges of size / 7 differ by rounding; one of them by a millionth makes cells of their own."""
+    geometry = box_mesh("box", "hex8", (7, 1, 1), (size, size, size)).geometry
+    assert len(np.unique(np.diff(np.unique(geometry.X[:, 0])))) > 1
+    assert geometry.metric[0].shape == (1, 8, 8, 3)
+    X = np.where(geometry.X == size, (1.0 + 1e-6) * size, geometry.X)
+    assert replace(geometry, X=X).metric[0].shape == (7, 8, 8, 3)
+
+
+def test_neighbours_of_a_cell_share_a_facet() -> None:
+    block = Block(**SMALL, size="1,2,2", alpha=1.0)  # cubes
+    centres = block.mesh.geometry.centres
+    near = [(i, j) for i in range(4) for j in range(4) if i < j and np.linalg.norm(centres[i] - centres[j]) < 1.1]
+    assert sorted(tuple(sorted(pair)) for pair in block.regularization.pairs.tolist()) == near
+
+
 def test_a_patch_of_any_element_is_stretched_evenly() -> None:
     """nu = 0 and one E: F = diag(1, 1, s) with E/2 (s - 1/s) = t wherever, on every mesh."""
     s = 0.3 + np.sqrt(0.3**2 + 1.0)
@@ -311,6 +342,7 @@ def test_data_a_thousand_times_off_are_warned_of(tmp_path: Path) -> None:
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], None, ""),
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [0.1, 0.1, 0.1], "folded over a neighbour"),
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [1 / 3, 1 / 3, 1 / 3], "flat, inside out"),
+        ("tetra", [[0, 1, 2, 3], [4, 4, 4, 4]], None, "1 of 2 cells are flat, .*, first cell 2"),
     ],
 )
 def test_invalid_meshes_are_refused(kind: str, cells: list, moved: list | None, says: str, tmp_path: Path) -> None:
