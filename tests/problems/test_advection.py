@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import relative_error, somewhere
 
-from gradient_routes.problems.advection import Advection, plume
+from gradient_routes.problems.advection import Advection, inclusion, plume
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.supg import Supg, unit_vector
 from gradient_routes.problems.problem import Array
@@ -246,6 +246,12 @@ def test_a_twin_starts_where_nothing_is_known_and_ends_at_its_truth(unknown: str
     noisy = with_synthetic_data(Advection(n=6, unknown=unknown, data="twin", noise=0.1, seed=3))
     assert 0.03 < rms(noisy.d - advection.d) < 0.2  # 11 draws
     assert Advection().truth() is None
+
+
+def test_the_inclusion_diffuses_four_times_as_much() -> None:
+    at = np.array([[0.5, 0.5], [0.5, 0.74], [0.26, 0.5], [0.5, 0.76], [0.0, 1.0]])
+    np.testing.assert_array_equal(inclusion(at), [4.0, 4.0, 4.0, 1.0, 1.0])
+    np.testing.assert_array_equal(inclusion(at[3:]), [4.0, 1.0])  # the nearest point, outside the disc
 
 
 @pytest.mark.parametrize("unknown", ["diffusivity", "source"])

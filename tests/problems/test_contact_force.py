@@ -19,6 +19,7 @@ def force(law: ContactLaw, C: float, number: type) -> float:
         (Softplus(1e3, 1e-2), 0.5),  # open, k C = 5e-11: by differences 5e-5 would be lost
         (Softplus(1e-3, 1e-2), 0.81),  # closed and soft, k C = 6e-4: 1e-13
         (Softplus(1e12, 1.0), 1e3),  # k C = 1e3: the law would lose 3e-15
+        (Softplus(1e3, 1e-2), 0.81),  # k C = 6: the law would lose 6e-16
         (Quadratic(1e3, 1e-2), 0.81),  # k C = 39: the law would lose 6e-16
     ],
 )

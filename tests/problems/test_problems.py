@@ -141,6 +141,15 @@ def test_closed_form_equals_dense_algebra(name: str) -> None:
     assert reference.size >= np.linalg.norm(reference.gradient) * (1 - 1e-12)
 
 
+def test_the_size_of_a_closed_form_is_that_of_its_terms() -> None:
+    """One spring of compliance s: dJ/dtheta = -s (s - d), whose terms are s^2 and s d."""
+    bar = Bar(n=1)
+    s, d = np.exp(-0.5), bar.sensors.d[0]
+    reference = bar.reference(np.array([0.5]))
+    np.testing.assert_allclose(reference.gradient, [-s * (s - d)], rtol=1e-13)
+    assert reference.size == pytest.approx(s * (s + d), rel=1e-14)
+
+
 @pytest.mark.parametrize("name", [n for n in ZOO if n.startswith("bar")])
 def test_a_bar_of_twice_as_many_elements_is_the_same_bar(name: str) -> None:
     """Constant in every element, its moduli give the same displacements at the same places."""
