@@ -49,7 +49,7 @@ def nothing_wrong(**options: Any) -> None:
     return None
 
 
-def as_given(model: Model, p: Array, affordable: Affordable = lambda options: True, **options: Any) -> Options:
+def as_given(model: Model, p: Array, affordable: Affordable | None = None, **options: Any) -> Options:
     return options
 
 

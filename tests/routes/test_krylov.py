@@ -64,6 +64,15 @@ def test_solutions_are_as_exact_as_wanted_and_every_product_is_told(method, spre
     assert products <= products_to(spread, 1.0, 1e-12) + 3
 
 
+@pytest.mark.parametrize(
+    ("rate", "wanted", "products"),
+    [(0.1, 1e-3, 3.0), (0.5, 0.25, 2.0), (0.5, 1.0, 0.0), (0.0, 1e-9, 0.0), (1.0, 0.5, np.inf), (2.0, 0.5, np.inf),
+     (0.5, 0.0, np.inf)],
+)  # fmt: skip
+def test_products_to_a_residual_are_counted_by_the_rate(rate: float, wanted: float, products: float) -> None:
+    assert products_to(rate, 1.0, wanted) == pytest.approx(products)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_factors_of_the_matrix_itself_take_one_product_to_be_believed(method) -> None:
     A, b = MATRICES[method](0.5), np.ones(N)
