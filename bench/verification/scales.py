@@ -43,7 +43,7 @@ def _usual(p: Array) -> float:
 def _change(subject: Subject, J: Guarded, J_0: float) -> float:
     """|J(p + 0.1 |p|) - J(p)|: what the parameters whose scale is known do."""
     q = subject.p + RESPONSE * np.where(np.isnan(subject.scale), 0.0, np.abs(subject.p))
-    if J.left() < 1 or not subject.inside(q):
+    if not subject.inside(q):
         return 0.0
     return float(np.nan_to_num(abs(J(q) - J_0), nan=0.0, posinf=0.0))
 
