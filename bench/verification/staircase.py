@@ -66,7 +66,7 @@ def abrupt(q: Quotients, small: float, large: float, eps: float) -> bool:
     """Whether J leaves its slope at small steps at once, on one side at least: smooth J do so by degrees.
 
     small, large: the slopes at small and at large steps, less the gradient's. Where the quotients have gone a tenth of
-    the way between them the departure of J, which then is their difference times h, is compared with the step before.
+    the way between them the departure of J, which then is their difference times h, is compared with smaller steps.
     """
     least = ROUNDINGS * eps * abs(q.J) or np.finfo(np.float64).tiny
     for dJ, s in ((q.J_plus - q.J, q.s_plus), (q.J - q.J_minus, q.s_minus)):
@@ -74,6 +74,6 @@ def abrupt(q: Quotients, small: float, large: float, eps: float) -> bool:
         known = np.isfinite(away)
         away, h = away[known], q.h[known]
         gone = np.flatnonzero((away >= GONE * abs(large - small) * h) & (away > ABRUPT * least))
-        if gone.size and gone[0] > 0 and away[gone[0]] > ABRUPT * max(away[gone[0] - 1], least):
+        if gone.size and gone[0] > 0 and away[gone[0]] > ABRUPT * max(away[: gone[0]].max(), least):
             return True
     return False
