@@ -65,6 +65,8 @@ def test_steps_smaller_than_a_tread_convict_nobody(inside) -> None:
     assert found.verdict in ("agrees", "noise-limited")
     within = check(lambda p: inside(p) + 0.5 * float(p @ p), lambda p: p, p)  # the slope within a tread
     assert within.verdict != "agrees"
+    assert within.deciding is not None
+    assert within.deciding.says == "plateau"
 
 
 def test_a_fine_but_smooth_J_is_no_staircase() -> None:

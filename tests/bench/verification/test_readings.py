@@ -20,6 +20,7 @@ from gradient_routes.bench.verification.plateau import Level
 from gradient_routes.bench.verification.quotients import Quotients
 from gradient_routes.bench.verification.reading import Reading, stencil_changes
 from gradient_routes.bench.verification.registered import _iterated
+from gradient_routes.bench.verification.scales import with_scales
 from gradient_routes.bench.verification.tightening import _lines
 
 P = np.array([2.0, 4.0, 1.0, 3.0, 5.0])
@@ -63,6 +64,13 @@ def test_whole_lines_and_wrong_components_are_read_again() -> None:
     wrong, right = read("plateau", whole=False), read("agrees", whole=False)
     assert _lines([one, right, wrong, other], other) == [other, one, wrong]
     assert _lines([one, right, wrong, other], wrong) == [one, wrong, other]
+
+
+def test_no_scale_is_found_where_J_is_zero_and_no_other_parameter_may_move() -> None:
+    held = subject(lambda p: float(p[1]), lambda p: np.array([0.0, 1.0]), [2e4, 0.0], bounds=([0.0, -1.0], [2e4, 1.0]))
+    found = with_scales(held, Guarded(held.objective), 0.0)
+    assert found.scale.tolist() == [2e4, 2e4]
+    assert "J does not respond" in found.notes[0]
 
 
 def test_iterates_are_taken_further_as_the_tolerance_falls() -> None:
