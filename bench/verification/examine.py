@@ -165,8 +165,8 @@ class Examination:
 
     def _reading(self, q: Quotients) -> Reading:
         few = len(q.h) < len(self.plan.steps) and self.readings  # all steps of the first line estimate noise better
-        own = noise(q, self.J.eps, self.repeated.values)
-        sigma = self.readings[0].noise if few else max(own, self.remembers, self.treads)
+        own = self.readings[0].noise if few else noise(q, self.J.eps, self.repeated.values)
+        sigma = own if few else max(own, self.remembers, self.treads)
         by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
         natural_change = self.readings[0].change if self.readings else 0.0
         changes = stencil_changes(self.subject, q.line.v)

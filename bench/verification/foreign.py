@@ -81,10 +81,13 @@ def subject(
     wrong = (s <= 0) | np.isinf(s)
     _all(~wrong, lambda i: f"scale[{i}] = {s[i]:g} - give scales > 0 and finite")
     lower, upper = _bounds(bounds, p)
-    spans = [f"{a:g} to {b:g}" for a, b in zip(lower, upper, strict=True)]
-    _all(lower <= upper, lambda i: f"bounds[{i}] = {spans[i]} - give (lower, upper), lower <= upper")
+
+    def span(i: int) -> str:
+        return f"{lower[i]:g} to {upper[i]:g}"
+
+    _all(lower <= upper, lambda i: f"bounds[{i}] = {span(i)} - give (lower, upper), lower <= upper")
     inside = (p >= lower) & (p <= upper)
-    _all(inside, lambda i: f"start[{i}] = {p[i]:g} is outside its bounds {spans[i]} - start inside")
+    _all(inside, lambda i: f"start[{i}] = {p[i]:g} is outside its bounds {span(i)} - start inside")
     label = default_label if names is None else _labels(names, n_p)
     made = Subject(name, objective, gradient, p, s, lower, upper, label=label)
 

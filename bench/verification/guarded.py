@@ -67,18 +67,21 @@ class Guarded:
         self.account.calls += 1
         given = p.copy()
         try:
-            with np.errstate(all="ignore"):
-                value = number(self.objective(given))
+            value = number(self.objective(given))
         except FOREIGN as failure:
             return self._nothing(p, one_line(failure))
-        self.mutates |= not np.array_equal(given, p)
+        self.mutates |= not (given == p).all()
         if not math.isfinite(value):
             return self._nothing(p, f"J = {value}")
+        if self._single:
+            self._look_at_precision(value)
+        return value
+
+    def _look_at_precision(self, value: float) -> None:
         with np.errstate(over="ignore"):
-            self._single &= float(np.float32(value)) == value
+            self._single = float(np.float32(value)) == value
             if len(self._values) < VALUES and float(np.float16(value)) != value:
                 self._values.add(value)
-        return value
 
     def sharing(self, objective: Callable[[Array], Any]) -> Guarded:
         """Another objective on the same account."""

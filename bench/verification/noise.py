@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from statistics import median
 
 import numpy as np
 
@@ -27,11 +28,11 @@ def noise(q: Quotients, eps: float, repeated: Array) -> float:
     second = np.abs(q.jump * q.h)
     if not q.two_sided:  # one side only: subtract the slope predicted by the gradient instead
         second = np.abs(q.off_forward * q.h) * np.sqrt(3.0)
-    known = second[np.isfinite(second)]
+    known = second[np.isfinite(second)].tolist()
     count = min(WINDOW, len(known))
-    medians = [float(np.median(known[k : k + count])) for k in range(len(known) - count + 1)] if count > 2 else []
-    noisy = known[: int(np.argmin(medians)) + count] if medians else np.zeros(1)
-    typical = max(min(medians, default=0.0), float(np.median(noisy)))
+    medians = [median(known[k : k + count]) for k in range(len(known) - count + 1)] if count > 2 else []
+    least = min(medians, default=0.0)
+    typical = max(least, median(known[: medians.index(least) + count])) if medians else 0.0
     scatter = float(np.std(repeated, ddof=1)) if len(repeated) > 1 else 0.0
     seen = np.concatenate([q.J_plus, q.J_minus, [q.J]])
     gaps = np.diff(np.unique(seen[np.isfinite(seen)]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class Plan:
         if self.seed < 0:
             raise InputError(f"seed {self.seed} - give a whole number >= 0")
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """All steps, ascending."""
         count = round(math.log10(self.h_max / self.h_min) * self.per_decade)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
 
 import numpy as np
 
@@ -52,27 +55,30 @@ def level(h: Array, q: Array, noise: float, tolerable: float) -> Level | None:
 
 
 def levels(h: Array, q: Array, noise: float) -> Iterator[Level]:
-    """The median of every range of one decade; with five points or more the farthest from it is ignored."""
+    """The median of every range of one decade; with five points or more the farthest from it is ignored.
+
+    On lists: the ranges are of a few points each, and there are many.
+    """
     known = np.isfinite(q)
-    h, q = h[known], q[known]
-    for first, h_min in enumerate(h):
-        last = int(np.searchsorted(h, DECADE * h_min, side="right"))
-        if last - first < FEWEST or h[last - 1] < NEARLY * DECADE * h_min:
+    steps, quotients = h[known].tolist(), q[known].tolist()
+    for first, h_min in enumerate(steps):
+        last = bisect_right(steps, DECADE * h_min)
+        if last - first < FEWEST or steps[last - 1] < NEARLY * DECADE * h_min:
             continue
-        values = q[first:last]
-        middle = float(np.median(values))
-        off = np.sort(np.abs(values - middle))
-        spread = float(off[-2] if len(off) >= 5 else off[-1]) * _extrapolation(values)
-        yield Level(middle, spread + NOISE * noise / float(h_min), float(h_min), float(h[last - 1]))
+        values = quotients[first:last]
+        middle = median(values)
+        off = sorted(abs(value - middle) for value in values)
+        spread = (off[-2] if len(off) >= 5 else off[-1]) * _extrapolation(values)
+        yield Level(middle, spread + NOISE * noise / h_min, h_min, steps[last - 1])
 
 
-def _extrapolation(values: Array) -> float:
+def _extrapolation(values: list[float]) -> float:
     """By how much the quotients may still change as h -> 0, in units of their spread.
 
     A geometric series where they are monotone and their differences shrink slowly, as those of |p|^1.1; else 1.
     """
-    steps = np.diff(values)
-    if not ((steps > 0).all() or (steps < 0).all()):
+    steps = [b - a for a, b in pairwise(values)]
+    if not (min(steps) > 0 or max(steps) < 0):
         return 1.0
-    ratio = abs(steps[0] / steps[-1]) ** (1.0 / (len(steps) - 1))
-    return float(1.0 / (1.0 - min(ratio, SLOWEST)))
+    ratio = float(abs(steps[0] / steps[-1]) ** (1.0 / (len(steps) - 1)))
+    return 1.0 / (1.0 - min(ratio, SLOWEST))
