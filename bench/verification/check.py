@@ -80,13 +80,13 @@ def _at_a_second_point(seen: Examination, found: Check) -> Check:
     except Unusable as failure:
         return replace(found, not_done=(*found.not_done, f"no second point: there {failure}"))
     other.elsewhere = seen.subject.p
-    other.readings.append(seen.readings[0])  # its noise: few steps show none
+    other.like = seen.readings[0]
     reading = other.read(line, h)
     if reading.says == "plateau" and not seen.stationary and np.array_equal(other.gradient, seen.gradient):
         there = replace(found, verdict="wrong-gradient", deciding=reading, elsewhere=reading, compared=SAME)
         return replace(messages.explained(there, seen), moved=DIFFERS)
     if seen.stationary or reading.says == "plateau":
-        other.readings.clear()
+        other.like = None if seen.stationary else other.like
         other.run()
         there = judged(other)
         if there.verdict != "agrees" or seen.stationary:

@@ -39,6 +39,7 @@ class Examination:
 
     repeated   values of J(p) and gradients, asked for several times
     elsewhere  a second point (n_p,) at which J has a value
+    like       a reading elsewhere, swept over all steps: its noise and its best step are taken
     remembers  by how much calls at other points changed J(p)
     treads     standard deviation of J in large steps, where small ones lie within a tread
     """
@@ -49,6 +50,7 @@ class Examination:
     repeated: Repeated
     accepted: float
     elsewhere: Array | None = None
+    like: Reading | None = None
     readings: list[Reading] = field(default_factory=list)
     remembers: float = 0.0
     treads: float = 0.0
@@ -110,11 +112,16 @@ class Examination:
                 self._test_memory()
             if k == 1 or (self.readings and self.readings[-1].contradicted and not self.treads):
                 self._test_treads(self.readings[-1])
-            best = self.readings[0].level if self.readings else None
-            if self.plan.everywhere or k == 0 or best is None:
+            best = base.level if (base := self._base) is not None else None
+            if self.plan.everywhere or (k == 0 and self.like is None) or best is None:
                 self.readings.append(self.read(line, self.plan.steps))
             else:
                 self.readings.append(self._extended(self.read(line, self.plan.near(best.h))))
+
+    @property
+    def _base(self) -> Reading | None:
+        """A reading of all steps."""
+        return self.like or (self.readings[0] if self.readings else None)
 
     def read(self, line: Line, h: Array) -> Reading:
         """The quotients of one line, as far as the budget goes."""
@@ -164,11 +171,11 @@ class Examination:
         return self._reading(q.joined(quotients(self.J, self.J_0, self.subject, self.gradient, q.line, more)))
 
     def _reading(self, q: Quotients) -> Reading:
-        few = len(q.h) < len(self.plan.steps) and self.readings  # all steps of the first line estimate noise better
-        own = self.readings[0].noise if few else noise(q, self.J.eps, self.repeated.values)
-        sigma = own if few else max(own, self.remembers, self.treads)
+        base = self._base if len(q.h) < len(self.plan.steps) else None  # all steps tell the noise better than few
+        own = base.noise if base is not None else noise(q, self.J.eps, self.repeated.values)
+        sigma = own if base is not None else max(own, self.remembers, self.treads)
         by_nature = self.subject.accuracy * max(self.size, abs(self.J_0))
-        natural_change = self.readings[0].change if self.readings else 0.0
+        natural_change = self._base.change if self._base is not None else 0.0
         changes = stencil_changes(self.subject, q.line.v)
         again = not (self.repeated.scatters or self.remembers)
         return Reading(q, sigma, self.size, self.accepted, by_nature, changes, natural_change, self.J.eps, again)

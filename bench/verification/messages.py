@@ -157,7 +157,7 @@ def _on_plateau(check: Check, reading: Reading) -> Check:
             return replace(check, says=says, todo="check on finer meshes: no order shows on these", culprit=culprit)
         says += f": h^{check.refined.order:.1f}, not a discretization error"
     if located is not None and located.worst:
-        says += f"; {_components(located)}"
+        says += f"; {_components(located, 'differ' if check.verdict == 'undetermined' else 'are wrong')}"
         culprit = culprit or _component_culprit(located)
     if check.compared is not None:
         says += f"; {check.compared}"
@@ -294,16 +294,18 @@ def _tighten_by(check: Check, culprit: str | None) -> str:
     return f"{todo}; look at {culprit}" if culprit else todo
 
 
-def _components(located: Located) -> str:
+def _components(located: Located, what: str) -> str:
+    """`what`: they are wrong, or, where it is open whose the error is, differ."""
     w = located.worst[0]
     named = ", ".join(x.name for x in located.worst[:SHOWN])
     if located.everywhere and located.factor is not None:
         return f"all tested components ({named}) and the whole gradient are off by {_factor(located.factor)}"
     if located.everywhere:
-        return f"many components are wrong, {named} among them: {_pair(w)}"
+        return f"many components {what}, {named} among them: {_pair(w)}"
     if located.right:
         return f"{named}: {_pair(w)}, the other {located.right} are right"
-    return f"at least {named} {'is' if len(located.worst) == 1 else 'are'} wrong: {_pair(w)}"
+    one = {"are wrong": "is wrong", "differ": "differs"}[what]
+    return f"at least {named} {one if len(located.worst) == 1 else what}: {_pair(w)}"
 
 
 def _pair(w: Worst) -> str:

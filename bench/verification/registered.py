@@ -64,6 +64,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         tighten=tighten,
         refine=refine if Offers.REFINED in problem.offers else None,
         active_set=_active_set(problem, solver),
+        again=lambda q: subject(problem, route, options, q, solver),
         accuracy=route.accuracy,
     )
     if Offers.COMPLEX in offers:

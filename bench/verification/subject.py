@@ -28,6 +28,7 @@ class Subject:
     exact       () -> dJ/dp (n_p,) by the adjoint method, for comparison
     slopes      V (n_p, m) -> V^T dJ/dp by complex steps
     explain     gradient -> findings on the factors of the gradient
+    again       q -> the same subject at another point, with all that is known of it there
     accuracy    error that the gradient has by its nature, as one by finite differences, relative to |g w| or J
     notes       what was assumed or left out
     places      (n_p,) the author's own indices of the components; None where they are these
@@ -50,12 +51,15 @@ class Subject:
     exact: Callable[[], Array] | None = None
     slopes: Callable[[Array], Array] | None = None
     explain: Callable[[Array], list[Finding]] | None = None
+    again: Callable[[Array], Subject] | None = None
     accuracy: float = 0.0
     notes: tuple[str, ...] = ()
     places: Array | None = None
 
     def moved(self, q: Array) -> Subject:
-        """The same subject at another point; what is known at p alone does not go with it."""
+        """The same subject at another point; without `again`, what is known at p alone does not go with it."""
+        if self.again is not None:
+            return self.again(q)
         tighten = self.tighten
         tightened = None if tighten is None else lambda factor: tighten(factor).moved(q)
         return replace(self, p=q, tighten=tightened, refine=None, exact=None, slopes=None, explain=None, scaled=None)
