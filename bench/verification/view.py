@@ -16,7 +16,7 @@ from gradient_routes.bench.verification.contract import Contract
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
-from gradient_routes.bench.verification.result import Check
+from gradient_routes.bench.verification.result import Check, Verdict
 from gradient_routes.bench.verification.table import HEADINGS, LEGEND, rows
 
 STYLES = {"agrees": "bold green", "wrong-gradient": "bold red", "inconsistent-discretization": "bold red"}
@@ -43,7 +43,7 @@ def show_check(out: Console, check: Check, curves: bool = True) -> None:
     if check.readings:
         block(lines(check), LEGEND)
     if check.located is not None and check.located.worst:
-        block(components(check.located))
+        block(components(check.located, check.verdict))
     if curves and check.deciding is not None:
         out.print()
         out.print(curve(check, check.deciding, min(out.width, WIDEST)))
@@ -67,9 +67,9 @@ def lines(check: Check) -> Table:
     return table
 
 
-def components(located: Located) -> Table:
-    """Wrong components, by the gradient and by differences."""
-    table = _table("wrong component", 15)
+def components(located: Located, verdict: Verdict) -> Table:
+    """Components that are wrong, or only differ, where it is open whose the error is: by gradient and differences."""
+    table = _table("component that differs" if verdict == "undetermined" else "wrong component", 15)
     for heading in ("gradient", "differences", "ratio"):
         table.add_column(heading, justify="right", no_wrap=True)
     for w in located.worst:
