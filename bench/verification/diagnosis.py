@@ -18,7 +18,7 @@ from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.locate import Located, Search, locate
 from gradient_routes.bench.verification.reading import Reading
 from gradient_routes.bench.verification.refinement import refine
-from gradient_routes.bench.verification.result import Check, Refined
+from gradient_routes.bench.verification.result import SHRINKS, Check, Refined
 from gradient_routes.bench.verification.segment import segment
 from gradient_routes.bench.verification.tightening import tighten
 from gradient_routes.bench.verification.unrepeatable import unrepeatable
@@ -57,7 +57,7 @@ def _refined(found: Check, seen: Examination, reading: Reading) -> Check:
     refined = refine(seen, reading)
     if isinstance(refined, Refined):
         return replace(found, refined=refined)
-    why = Finding("mesh refinement", math.nan, verdict.SHRINKS, refined)
+    why = Finding("mesh refinement", math.nan, SHRINKS, refined)
     return replace(found, findings=(*found.findings, why))
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from gradient_routes.bench.verification.locate import Located
 from gradient_routes.bench.verification.reading import Reading
-from gradient_routes.bench.verification.result import SHRINKS, Check, Verdict
+from gradient_routes.bench.verification.result import Check, Verdict
 
-__all__ = ["SHRINKS", "agreed", "certain", "convicted", "solver_explains", "verdict"]
 FALLEN = 1.0 / 3.0  # of a plateau: it has fallen
 STANDS = 0.9  # of a plateau: it has not moved
 OTHERS = 3  # right components for every wrong one, so that the error is local
