@@ -20,6 +20,8 @@ from gradient_routes.bench.verification.verdict import verdict
 from gradient_routes.problems.errors import InputError
 
 NAME = "at a second point"
+SECOND = 11  # objective calls that are kept for it, of a budget that is not smaller than
+ENOUGH = 4  # times that
 STATIONARY = "J is stationary at p, where a gradient of zero passes: judged at a point 5 % away"
 SAME = "the gradient is that at p: it does not change with p"
 DIFFERS = "at p the gradient agrees with differences; at a point 5 % away it does not"
@@ -52,9 +54,12 @@ def _checked(subject: Subject, plan: Plan, J: Guarded, accepted: float) -> Check
         return messages.on_unusable(subject.name, failure)
     except NoValue:
         return messages.on_no_value(subject.name, J)
+    if plan.budget >= ENOUGH * SECOND:
+        J.account.kept = SECOND
     seen.run()
+    J.account.kept = 0
     found = judged(seen)
-    if found.verdict == "agrees" and seen.elsewhere is not None:
+    if found.verdict == "agrees":
         found = _at_a_second_point(seen, found)
     return replace(found, remarks=messages.remarks(found, seen))
 
@@ -67,18 +72,19 @@ def judged(seen: Examination) -> Check:
 
 def _at_a_second_point(seen: Examination, found: Check) -> Check:
     """A gradient that agrees at p: what a second point says, where p cannot tell or where they disagree."""
-    assert seen.elsewhere is not None
+    if seen.elsewhere is None:
+        return _without_a_second_point(seen, found, "J has no value at one")
     moved = seen.subject.moved(seen.elsewhere)
     (line,) = directions(moved, 1, seen.plan.seed + 5)
     line = replace(line, name=NAME)
     best = found.deciding.level if found.deciding is not None else None
     h = seen.plan.near(best.h) if best is not None else seen.plan.steps
     if seen.J.left() < 1 + 2 * len(h):
-        return replace(found, not_done=(*found.not_done, "no second point: the budget is spent"))
+        return _without_a_second_point(seen, found, "the budget is spent")
     try:
         other = Examination.lightly(moved, seen.plan, seen.J, seen.accepted)
     except Unusable as failure:
-        return replace(found, not_done=(*found.not_done, f"no second point: there {failure}"))
+        return _without_a_second_point(seen, found, f"there {failure}")
     other.elsewhere = seen.subject.p
     other.like = seen.readings[0]
     reading = other.read(line, h)
@@ -91,6 +97,15 @@ def _at_a_second_point(seen: Examination, found: Check) -> Check:
         there = judged(other)
         if there.verdict != "agrees" or seen.stationary:
             why = STATIONARY if seen.stationary else DIFFERS
-            return replace(there, moved=why, todo=there.todo)
+            return replace(there, moved=why)
         reading = other.readings[0]
     return replace(found, elsewhere=reading)
+
+
+def _without_a_second_point(seen: Examination, found: Check, why: str) -> Check:
+    """A note; where J is stationary at p nothing is known, for a gradient of zero passes there."""
+    found = replace(found, not_done=(*found.not_done, f"no second point: {why}"))
+    if not seen.stationary:
+        return found
+    says = "J is stationary at p, where a gradient of zero passes, and no other point was judged"
+    return replace(found, verdict="undetermined", says=says, todo="give another start, or a larger budget")

@@ -81,7 +81,10 @@ def complex_steps(seen: Examination) -> Iterator[Finding]:
 def fresh_value(seen: Examination) -> Iterator[Finding]:
     """J at a second point, by the objective and computed anew: a recording may replay what held at p only."""
     subject, q = seen.subject, seen.elsewhere
-    if subject.fresh is None or q is None or seen.J.left() < 2:
+    if subject.fresh is None:
+        return
+    if q is None or seen.J.left() < 2:
+        yield Finding(FRESH_J, float("nan"), FRESH, "not compared: no second point, or no calls left")
         return
     value, anew = seen.J(q), seen.J.sharing(subject.fresh)(q)
     off = abs(value - anew) / (max(abs(value), abs(anew), abs(value - seen.J_0)) or 1.0)

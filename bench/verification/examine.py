@@ -108,15 +108,15 @@ class Examination:
     def run(self) -> None:
         """Read every line: over all steps, or near the best step of the first."""
         for k, line in enumerate(self.lines()):
-            if k == 1:
-                self._test_memory()
-            if k == 1 or (self.readings and self.readings[-1].contradicted and not self.treads):
-                self._test_treads(self.readings[-1])
             best = base.level if (base := self._base) is not None else None
             if self.plan.everywhere or (k == 0 and self.like is None) or best is None:
                 self.readings.append(self.read(line, self.plan.steps))
             else:
                 self.readings.append(self._extended(self.read(line, self.plan.near(best.h))))
+            if k == 0:
+                self._test_memory()
+            if k == 0 or (self.readings[-1].contradicted and not self.treads):
+                self._test_treads(self.readings[-1])
 
     @property
     def _base(self) -> Reading | None:

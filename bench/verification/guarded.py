@@ -40,9 +40,10 @@ class Accident:
 
 @dataclass
 class Account:
-    """Calls made, and allowed; shared by an objective and its tightened and refined versions."""
+    """Calls made, allowed, and kept for later; shared by an objective and its tightened and refined versions."""
 
     budget: float = math.inf
+    kept: int = 0
     calls: int = 0
     gradients: int = 0
 
@@ -88,8 +89,8 @@ class Guarded:
         return Guarded(objective, self.account, self.accidents)
 
     def left(self) -> float:
-        """Calls left."""
-        return self.account.budget - self.account.calls
+        """Calls left, those that are kept for later aside."""
+        return self.account.budget - self.account.kept - self.account.calls
 
     @property
     def eps(self) -> float:

@@ -139,7 +139,7 @@ def _on_plateau(check: Check, reading: Reading) -> Check:
     proven = None if proof is None else proof.culprit
     culprit = proven
     says = f"a plateau of {reading.off:.2g} {_relative(reading)} along {reading.name}, at every step size"
-    if reading.quotients.line.whole and not reading.slope and not np.any(seen_gradient(check)):
+    if reading.quotients.line.whole and not reading.slope and not np.any(_slopes(check)):
         says += "; the gradient is exactly 0 while J moves: nothing is connected to p"
     if check.verdict == "solver-limited":
         return _on_solver(check, says, proven)
@@ -172,7 +172,7 @@ def _on_plateau(check: Check, reading: Reading) -> Check:
     return replace(check, says=says, todo=todo, culprit=culprit)
 
 
-def seen_gradient(check: Check) -> list[float]:
+def _slopes(check: Check) -> list[float]:
     """The slopes of the gradient on all lines."""
     return [r.slope for r in check.readings if np.isfinite(r.slope)]
 
@@ -243,11 +243,11 @@ def remarks(check: Check, seen: Examination) -> tuple[str, ...]:
         if scaled and len(seen.subject.p) > 1:
             said.append(f"tested relative to the whole gradient, too small on their own: {', '.join(scaled[:SHOWN])}")
         said += _odd_slopes(check.deciding)
-    if J.left() < 2 and math.isfinite(seen.plan.budget):
-        unread = sum(r.says == "nothing" for r in check.readings)
-        what = f"; {unread} lines were not sampled" if unread else ""
+    unread = sum(not r.sampled for r in check.readings)
+    if math.isfinite(seen.plan.budget) and (J.left() < 2 or unread):
+        what = f", {unread} lines were not sampled" if unread else ""
         more = f"--budget {2 * seen.plan.budget:g} tests more"
-        said.append(f"the budget of {seen.plan.budget:g} calls is spent{what}: {more}")
+        said.append(f"the budget of {seen.plan.budget:g} calls allows no more{what}: {more}")
     return tuple(said)
 
 

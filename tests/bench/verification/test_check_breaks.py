@@ -69,6 +69,14 @@ def test_steps_smaller_than_a_tread_convict_nobody(inside) -> None:
     assert within.deciding.says == "plateau"
 
 
+def test_a_single_parameter_in_treads_is_judged_like_several() -> None:
+    def J(p: Array) -> float:
+        return float(np.sin(np.round(p, 9)).sum() + 0.5 * p @ p)
+
+    assert check(J, lambda p: np.cos(p) + p, [0.1]).verdict in ("agrees", "noise-limited")
+    assert check(J, lambda p: p, [0.1]).verdict != "agrees"
+
+
 def test_a_fine_but_smooth_J_is_no_staircase() -> None:
     def J(p: Array) -> float:
         return float(np.sum(p**2 + 1e-3 * np.sin(1e4 * p)))

@@ -76,7 +76,7 @@ def test_a_smaller_budget_says_less_and_says_so() -> None:
     found = check(J, wrong(417, 2.0), P, budget=50)
     assert found.calls <= 50
     assert found.verdict == "wrong-gradient"
-    assert any("budget of 50 calls is spent" in remark for remark in found.remarks)
+    assert any("budget of 50 calls allows no more, 4 lines were not sampled" in remark for remark in found.remarks)
 
 
 @pytest.mark.parametrize(

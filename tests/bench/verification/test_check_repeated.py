@@ -133,6 +133,18 @@ def test_a_point_that_cannot_tell_is_left() -> None:
     assert found.moved is not None
 
 
+@pytest.mark.parametrize("budget", [20, 43, 60, 100, 240])
+def test_a_small_budget_acquits_nobody_where_p_cannot_tell(budget: int) -> None:
+    assert check(lambda p: float((p - P) @ (p - P)), lambda p: 0.0 * p, P, budget=budget).exit_code != 0
+
+
+@pytest.mark.parametrize("budget", [60, 100, 140])
+def test_calls_are_kept_for_the_second_point(budget: int) -> None:
+    found = check(lambda p: float(np.exp(p).sum()), lambda p: np.exp(P), P, budget=budget)
+    assert found.verdict == "wrong-gradient"
+    assert found.calls <= budget
+
+
 def test_a_gradient_of_zero_has_its_own_words() -> None:
     assert "nothing is connected to p" in check(J, lambda p: 0.0 * p, P).says
 
