@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gradient_routes.bench.cases import options, registry, selector
+from gradient_routes.bench.cases import declared, options, registry, selector
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.imported import is_reference
 from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.cases.sources import source
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters, Problem
@@ -73,8 +75,14 @@ def _written(name: str, given: dict[str, Any], target: Any) -> str:
     return selector.written(name, given, {name: option.default for name, option in declared.items()})
 
 
-def selector_of(kind: registry.Kind, name: str, given: dict[str, Any] | None) -> str:
-    """The selector of a stored problem or route without its defaults; with all options where it is no longer there."""
+def selector_of(kind: registry.Kind, name: str, given: dict[str, Any] | None, kept: Any = None) -> str:
+    """The selector of a stored problem or route without its defaults; with all options where they are not known.
+
+    `kept` is what its row holds of what it declares: code that a row names is not run to show it.
+    """
+    if is_reference(name):
+        known = None if kept else declared.known(kind, name)
+        return selector.written(name, given or {}, known.defaults if known else declared.defaults_of(kept))
     try:
         return _written(name, given or {}, registry.find(kind, name).load())
     except InputError:
@@ -83,12 +91,21 @@ def selector_of(kind: registry.Kind, name: str, given: dict[str, Any] | None) ->
 
 def problem_named(name: str, options: dict[str, Any]) -> ProblemSpec:
     """Raises InputError for a name that is not known here."""
-    return ProblemSpec(name, options, registry.find("problem", name).load())
+    return ProblemSpec(name, options, _target("problem", name))
 
 
 def route_named(name: str, options: dict[str, Any]) -> RouteSpec:
     """Raises InputError for a name that is not known here."""
-    return RouteSpec(name, registry.find("route", name).load(), options)
+    return RouteSpec(name, _target("route", name), options)
+
+
+def _target(kind: registry.Kind, name: str) -> Any:
+    """What the user named: code that is not registered is imported, and what it declares is known from then on."""
+    target = registry.find(kind, name).load()
+    if is_reference(name):
+        found = options.options_of(registry.factory_of(target))
+        declared.remember(kind, name, declared.Declared(found, source(target)))
+    return target
 
 
 def problems(selectors: Iterable[str]) -> list[ProblemSpec]:
@@ -122,7 +139,7 @@ def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str,
         else:
             names = [chosen.name]
         for name in names:
-            target = registry.find(kind, name).load()
+            target = _target(kind, name)
             for given in chosen.expand():
                 resolved = options.resolve(registry.factory_of(target), given, name)
                 if (name, resolved) not in seen:
@@ -151,7 +168,7 @@ def sized(spec: ProblemSpec, at: str) -> tuple[int, int]:
     return problem.n_state, len(point(problem, "start" if at == "true" else at))
 
 
-def files(specs: Iterable[ProblemSpec], at: str) -> list[Path]:
-    """The files that problems and `at` read."""
-    texts = [at, *(value for spec in specs for value in spec.options.values() if isinstance(value, str))]
+def files(options: Iterable[dict[str, Any]], at: str) -> list[Path]:
+    """The files that problems with these options and `at` read."""
+    texts = [at, *(value for given in options for value in given.values() if isinstance(value, str))]
     return [Path(text) for text in texts if os.path.isfile(text)]

@@ -27,6 +27,14 @@ class Table:
     question: tuple[str, ...] = ("problem", "route")
 
 
+# of what is named by code rather than by an entry point: see bench.cases.declared
+DECLARED = "of a {} named by FILE.py:NAME or module:NAME: defaults of its options, its file and module; else NULL"
+
+
+def declared(column: str, kind: str) -> Column:
+    return Column(f"{column}_declared", "TEXT", "", DECLARED.format(kind), json=True)
+
+
 # columns that several studies have
 WHAT = (
     Column("problem", "TEXT", "", "selector of the problem, or whose code was checked"),

@@ -9,12 +9,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases import case, declared
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import versions
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.cases.sources import Stamp, digest, stamp, stamps
+from gradient_routes.bench.cases.sources import Source, Stamp, digest, source, stamp, stamps
 
 HARNESS = 5  # raised when rows come to mean something else: all that was kept before is then stale
 
@@ -30,7 +30,8 @@ def identity(problem: case.ProblemSpec, route: case.RouteSpec, settings: Setting
         "settings": settings_of(settings, threads),
     }
     key = hashed(*asked.values())
-    return asked | {"case_key": key, "content_key": content_key(key, problem, route, settings.at)}
+    asked |= {"case_key": key, "content_key": content_key(key, problem, route, settings.at)}
+    return asked | declared.beside(asked)
 
 
 def settings_of(settings: Settings, threads: int) -> dict[str, Any]:
@@ -45,15 +46,20 @@ def settings_of(settings: Settings, threads: int) -> dict[str, Any]:
 
 def content_key(case_key: str, problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> str:
     """Another one where code, data, libraries or the harness have changed."""
-    data = [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in case.files([problem], at)]
-    code = [digest(problem.build), digest(route.route)]
-    return hashed(case_key, code, data, versions(), platform.python_version(), HARNESS)
+    return content_key_of(case_key, [source(problem.build), source(route.route)], problem.options, at)
+
+
+def content_key_of(case_key: str, code: list[Source], problem_options: dict[str, Any], at: str) -> str:
+    """The same, of what a row holds: files are read, nothing is run."""
+    data = [hashlib.sha256(file.read_bytes()).hexdigest() for file in case.files([problem_options], at)]
+    digests = [digest(each) for each in code]
+    return hashed(case_key, digests, data, versions(), platform.python_version(), HARNESS)
 
 
 def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:
     """The files that a content key is of: as long as they are as they were, so is what it stands for."""
-    data = tuple(stamp(Path(file)) for file in case.files([problem], at))
-    return (*stamps(problem.build), *stamps(route.route), *data)
+    data = tuple(stamp(Path(file)) for file in case.files([problem.options], at))
+    return (*stamps(source(problem.build)), *stamps(source(route.route)), *data)
 
 
 def hashed(*parts: Any) -> str:

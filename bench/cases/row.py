@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.bench.cases.column import Column, Row
+from gradient_routes.bench.cases.column import Column, Row, declared
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.routes.tally import KINDS
 
@@ -68,6 +68,8 @@ COLUMNS = (
     Column("host", "TEXT", "", "name of the machine it ran on"),
     Column("stderr", "TEXT", "", "its last lines on stderr"),
     Column("traceback", "TEXT", "", "of what it raised"),
+    declared("problem", "problem"),
+    declared("route", "route"),
     Column("case_key", "TEXT", "", "hash of what was asked: problem, route, their options, settings"),
     Column("content_key", "TEXT", "", "hash of that and of all it rests on: sources, data, versions, schema"),
 )

@@ -7,6 +7,7 @@ import hashlib
 import itertools
 import sys
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,14 +22,32 @@ OURS = ("gradient_routes.problems", "gradient_routes.routes")  # floors that a g
 Stamp = tuple[str, int, int]  # a file, when it was last written [ns], its size
 
 
-def digest(target: Any) -> str:
-    """Of the source of a factory or a Route; of its name where it has no source that can be read."""
-    return _source(target)[0]
+@dataclass(frozen=True)
+class Source:
+    """Where code is: its file, absolute, and its module; None and its full name where it has no file to be read."""
+
+    file: str | None
+    module: str
 
 
-def stamps(target: Any) -> tuple[Stamp, ...]:
+def source(target: Any) -> Source:
+    """Of a factory or a Route."""
+    function = target.function if isinstance(target, Route) else target
+    module = sys.modules.get(getattr(function, "__module__", None) or "")
+    name, file = getattr(module, "__name__", ""), getattr(module, "__file__", None)
+    if file is None or not Path(file).is_file():
+        return Source(None, f"{name}.{getattr(function, '__qualname__', '')}")
+    return Source(str(Path(file).absolute()), name)
+
+
+def digest(source: Source) -> str:
+    """Of what the code is made of; of its name where it has no file. Reads files, runs nothing."""
+    return _read(source)[0]
+
+
+def stamps(source: Source) -> tuple[Stamp, ...]:
     """The files that the digest is of, as they were when it was taken."""
-    return _source(target)[1]
+    return _read(source)[1]
 
 
 def stamp(file: Path) -> Stamp:
@@ -45,19 +64,19 @@ def changed(known: tuple[Stamp, ...]) -> str | None:
     return None
 
 
-def _source(target: Any) -> tuple[str, tuple[Stamp, ...]]:
-    function = target.function if isinstance(target, Route) else target
-    module = sys.modules.get(getattr(function, "__module__", None) or "")
-    name, file = getattr(module, "__name__", ""), getattr(module, "__file__", None)
-    if file is None or not Path(file).is_file():
-        return hashlib.sha256(f"{name}.{getattr(function, '__qualname__', '')}".encode()).hexdigest(), ()
-    return _digest(Path(file).absolute(), name)
+def _read(source: Source) -> tuple[str, tuple[Stamp, ...]]:
+    if source.file is None:
+        return hashlib.sha256(source.module.encode()).hexdigest(), ()
+    return _digest(Path(source.file), source.module)
 
 
 @cache
 def _digest(path: Path, module: str) -> tuple[str, tuple[Stamp, ...]]:
+    if not path.is_file():
+        raise FileNotFoundError(path)
     alone = module.startswith("_routes_")  # a file that was named, see bench.cases.imported
-    root = path.parent if alone else path.parents[module.count(".") + (path.name == "__init__.py")]
+    above = 0 if alone else module.count(".") + (path.name == "__init__.py")
+    root = path.parents[min(above, len(path.parents) - 1)]
     summed = hashlib.sha256()
     files = closure(path, root, None if alone else module.partition(".")[0])
     known = tuple(stamp(file) for file in sorted(files))  # first: what is written while it is read shows later
@@ -92,7 +111,7 @@ def imported_names(file: Path, root: Path) -> Iterator[str]:
     """
     try:
         tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError):  # it will say so itself when it is imported
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # it will say so itself when it is imported
         return
     package = file.parent.relative_to(root).parts if file.is_relative_to(root) else ()
     for node in ast.walk(tree):

@@ -8,7 +8,7 @@ documentation are all made from that value. A study is registered by an entry po
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
@@ -21,11 +21,15 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]  # as click.optio
 
 @dataclass(frozen=True)
 class Kept:
-    """A row of one of the study's tables; of `cases`, which the study has stored itself, where `stored`."""
+    """A row of one of the study's tables; of `cases`, which the study has stored itself, where `stored`.
+
+    `beside` are columns that every such table has in the store, see bench.cases.declared: a study leaves them out.
+    """
 
     table: str
     row: Row
     stored: bool = False
+    beside: Row = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -50,9 +50,13 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
 
 
 def _print(store: Store) -> None:
+    from gradient_routes.bench.cases.declared import undeclared
     from gradient_routes.bench.cases.order import in_order
     from gradient_routes.bench.render.terminal.tables import console
     from gradient_routes.bench.studies.bill.view import show
 
-    show(in_order(store.rows(), lambda row: row))
+    rows = in_order(store.rows(), lambda row: row)
+    show(rows)
+    if note := undeclared(rows):
+        console().print(note, style="dim", soft_wrap=True)
     console().print(MORE, style="dim", soft_wrap=True)

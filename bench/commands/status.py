@@ -26,9 +26,15 @@ def status(as_json: bool, store: Path) -> None:
     -                             not run
     (stale)                       code, data or libraries have changed since
     (gone)                        its problem or route no longer exists
+    (unchecked)                   of an older version, which did not keep where
+                                  the code of FILE.py:NAME is
+
+    Code that a store names is looked at, not run.
+
 
     `routes run ... --resume` runs what is missing, failed or stale.
     """
+    from gradient_routes.bench.cases.declared import undeclared
     from gradient_routes.bench.cases.row import as_json as json_line
     from gradient_routes.bench.commands.status_view import matrix
     from gradient_routes.bench.render.terminal import tables
@@ -43,3 +49,5 @@ def status(as_json: bool, store: Path) -> None:
     out = tables.console()
     tables.show(out, matrix(found))
     out.print(counts(found), style="dim", soft_wrap=True)
+    if note := undeclared(each.row for each in found):
+        out.print(note, style="dim", soft_wrap=True)

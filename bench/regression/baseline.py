@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases.column import Column, Row
+from gradient_routes.bench.cases.declared import defaults_of
 from gradient_routes.bench.cases.environment import Environment, fingerprint
 from gradient_routes.bench.cases.order import in_order
 from gradient_routes.bench.cases.row import COLUMNS, clean
-from gradient_routes.bench.regression.measured import KEPT, Case, Measured, Verdict, of_store
+from gradient_routes.bench.regression.measured import DECLARED, KEPT, Case, Measured, Verdict, of_store
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.tally import KINDS
@@ -70,6 +71,7 @@ def _json(value: Any) -> str:
 def _compact(case: Case) -> Row:
     """The row without absent values, counts of 0 and the predicted cost of what was run."""
     row = {name: value for name, value in case.row.items() if value is not None and name != "reason"}
+    row |= {name: {"defaults": defaults_of(row[name])} for name in DECLARED if name in row}
     row |= {name: _digits(row[name], 3) for name in ("gradient_error", "seconds") if name in row}
     if case.ok:
         row.pop("predicted_s", None)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from gradient_routes.bench.cases.declared import undeclared
 from gradient_routes.bench.cases.expected import Expectation, judged
 from gradient_routes.bench.regression import rules
 from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding, Judgement
@@ -78,7 +79,9 @@ def compare(
     findings += [rules.gone(case.row, case.row["status"], subset or not case.ok) for case in gone]
     findings += [rules.added(case.row, case.row["status"]) for case in added]
     findings += verdicts
-    return Comparison(base.source, new.source, tuple(findings), (*_libraries(pairs), *_idle(new, expectations)))
+    return Comparison(
+        base.source, new.source, tuple(findings), (*_libraries(pairs), *_idle(new, expectations), *_old(base, new))
+    )
 
 
 def _check_measured(base: Measured, new: Measured, pairs: Sequence[Pair], findings: Sequence[Finding]) -> None:
@@ -150,6 +153,12 @@ def _libraries(pairs: Sequence[Pair]) -> Iterator[str]:
     found = [tuple(library_differences(base, new)) for base, new in pairs]
     for one in dict.fromkeys(filter(None, found)):
         yield f"libraries differ in {found.count(one)} of {len(pairs)} cases: {'; '.join(one)}"
+
+
+def _old(*sides: Measured) -> Iterator[str]:
+    for side in sides:
+        if note := undeclared(case.row for case in side.cases):
+            yield f"{side.source}: {note}"
 
 
 def _idle(new: Measured, expectations: Sequence[Expectation]) -> Iterator[str]:

@@ -25,7 +25,8 @@ def section(source: Source) -> Section:
         (str(sum(of_studies.values())), "studies" + _listed(of_studies)),
         (str(len(source.environments)), _plural(len(source.environments), "environment")),
     )
-    says = "" if source.kept == len(cases) else f"The newest of {source.kept} runs of {len(cases)} cases."
+    newest = "" if source.kept == len(cases) else f"The newest of {source.kept} runs of {len(cases)} cases."
+    says = " ".join(filter(None, (newest, source.note and f"{source.note}.")))
     figures = (matrix(cases),) if cases else ()
     return Section("overview", "At a glance", says, figures, facts)
 

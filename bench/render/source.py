@@ -10,6 +10,7 @@ from functools import cache
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import selector_of
 from gradient_routes.bench.cases.column import Column, Row
+from gradient_routes.bench.cases.declared import kinds_of, undeclared
 from gradient_routes.bench.cases.registry import Kind
 from gradient_routes.bench.cases.row import COLUMNS, from_record
 from gradient_routes.bench.render.terminal.tables import asked
@@ -19,7 +20,9 @@ from gradient_routes.bench.store.store import Store
 
 @dataclass(frozen=True)
 class Source:
-    """Rows by table, as objects; `kept` counts all cases of the store, the newest of which are `cases`."""
+    """Rows by table, as objects; `kept` counts all cases of the store, the newest of which are `cases`; `note` says
+    what is not known of them.
+    """
 
     cases: list[Row] = field(default_factory=list)
     kept: int = 0
@@ -27,6 +30,7 @@ class Source:
     studies: list[Row] = field(default_factory=list)
     tables: dict[str, list[Row]] = field(default_factory=dict)
     name: str = ""
+    note: str = ""
 
     def table(self, name: str) -> list[Row]:
         """The rows of a study's table; none where this store has no such table."""
@@ -50,6 +54,7 @@ def read(store: Store) -> Source:
         studies=store.records("studies"),
         tables=named,
         name=store.path.name,
+        note=undeclared(cases),
     )
 
 
@@ -79,7 +84,7 @@ def latest(cases: Sequence[Row]) -> list[Row]:
     return [
         row
         | {"family": row["problem"], "problem": problem(row)}
-        | {"by": row["route"], "route": selector("route", row["route"], row["route_options"])}
+        | {"by": row["route"], "route": selector("route", row)}
         for row in newest.values()
     ]
 
@@ -103,24 +108,21 @@ def newest(rows: Sequence[Row], columns: Sequence[str]) -> list[Row]:
 
 def _named(row: Row, columns: Sequence[Column]) -> Row:
     """Problem and route by their selectors, where the table has names and options apart."""
-    names = {column.name for column in columns}
+    named = kinds_of({column.name: column for column in columns})
     given = {"problem": row.get("problem"), "route": row.get("route")}
-    for kind in ("problem", "route"):
-        if f"{kind}_options" in names:
-            given[kind] = selector(kind, row[kind], row[f"{kind}_options"])
-    if "other_options" in names:
-        given["other"] = selector("route", row["other"], row["other_options"])
-    return row | given
+    return row | given | {column: selector(kind, row, column) for column, kind in named}
 
 
-def selector(kind: Kind, name: str | None, options: Row | None) -> str:
-    """What names a problem or route with these options, its defaults left out."""
-    return "" if name is None else _selector(kind, name, json.dumps(options or {}))
+def selector(kind: Kind, row: Row, column: str = "") -> str:
+    """What names the problem or route of a row, its defaults left out."""
+    column = column or kind
+    name, options, kept = row[column], row[f"{column}_options"], row.get(f"{column}_declared")
+    return "" if name is None else _selector(kind, name, json.dumps(options or {}), json.dumps(kept))
 
 
 @cache
-def _selector(kind: Kind, name: str, options: str) -> str:
-    return selector_of(kind, name, json.loads(options))
+def _selector(kind: Kind, name: str, options: str, kept: str) -> str:
+    return selector_of(kind, name, json.loads(options), json.loads(kept))
 
 
 def schema(table: str) -> dict[str, Column]:

@@ -6,6 +6,7 @@ from functools import cache
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Column
+from gradient_routes.bench.cases.declared import with_declared
 from gradient_routes.bench.cases.row import ENVIRONMENTS, KEYS, SAMPLES, STORED
 
 KEY = Column("study_id", "INTEGER", "", "of the row in studies")
@@ -28,5 +29,5 @@ def tables() -> dict[str, tuple[Column, ...]]:
         "samples": SAMPLES,
         "environments": ENVIRONMENTS,
         "studies": STUDY,
-        **{name: (KEY, *table.columns) for name, table in registry.study_tables().items()},
+        **{name: (KEY, *with_declared(table.columns)) for name, table in registry.study_tables().items()},
     }

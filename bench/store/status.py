@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from gradient_routes.bench.cases.case import problem_named, route_named
+from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.cases.keys import content_key
+from gradient_routes.bench.cases.declared import source_of
+from gradient_routes.bench.cases.imported import is_reference
+from gradient_routes.bench.cases.keys import content_key_of
+from gradient_routes.bench.cases.sources import Source, source
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 
-STALE, GONE = "stale", "gone"
+STALE, GONE, UNCHECKED = "stale", "gone", "unchecked"
 
 
 @dataclass(frozen=True)
 class Standing:
-    """A case: its newest row, and stale or gone where the code it came from has changed or is no longer there."""
+    """A case: its newest row, and stale or gone where the code it came from has changed or is no longer there;
+    unchecked where the row does not say where the code is.
+    """
 
     row: Row
     aged: str | None
@@ -38,12 +43,20 @@ def standings(store: Store) -> list[Standing]:
 
 def _aged(row: Row) -> str | None:
     try:
-        problem = problem_named(row["problem"], row["problem_options"])
-        route = route_named(row["route"], row["route_options"])
-        now = content_key(row["case_key"], problem, route, row["at"])
+        code = [_source("problem", row), _source("route", row)]
+        if None in code:
+            return UNCHECKED
+        now = content_key_of(row["case_key"], [each for each in code if each], row["problem_options"] or {}, row["at"])
     except (InputError, OSError):
         return GONE
     return None if now == row["content_key"] else STALE
+
+
+def _source(kind: registry.Kind, row: Row) -> Source | None:
+    """Where the code of a row is now, None where the row does not say; code that the row names is not run."""
+    if is_reference(row[kind]):
+        return source_of(row[f"{kind}_declared"])
+    return source(registry.find(kind, row[kind]).load())
 
 
 def counts(standing: list[Standing]) -> str:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.declared import beside
 from gradient_routes.bench.cases.environment import Environment, environment, fingerprint
 from gradient_routes.bench.cases.row import ENVIRONMENTS, STORED, as_record, from_record, stored
 from gradient_routes.bench.cases.samples import Samples
@@ -100,7 +101,8 @@ class Store:
                 columns = tables()[name][1:]
                 marks = ", ".join("?" * (1 + len(columns)))
                 names = ", ".join(f'"{c.name}"' for c in (KEY, *columns))
-                records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in rows]
+                whole = (beside(row) | row for row in rows)
+                records = [(study_id, *(stored(c, row[c.name]) for c in columns)) for row in whole]
                 db.executemany(f'INSERT INTO "{name}" ({names}) VALUES ({marks})', records)
             return study_id
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO, cast
 
 from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.declared import beside
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.study import Found, Kept, Message, Options, Study
 from gradient_routes.bench.execution.isolation.channel import Channel
@@ -90,6 +91,7 @@ class RunStudy:
         def say(message: Message) -> None:
             if isinstance(message, Kept) and not message.stored:
                 _check(study, message)
+                message = replace(message, beside=beside(message.row))
             if not isinstance(message, Found):
                 channel.say(message)
             elif self.as_json:

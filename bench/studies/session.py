@@ -35,9 +35,9 @@ class Session:
 
     def hear(self, message: Message) -> None:
         match message:
-            case Kept(table, row, stored):
+            case Kept(table, row, stored, beside):
                 if not stored:
-                    self.tables[table].append(row)
+                    self.tables[table].append(row | beside)
                 if self.as_json and self.study.json is None:
                     self._print(as_json({"table": table, **row}) + "\n")
             case Note(text, result):

@@ -73,4 +73,4 @@ def shipped(job: Measure) -> ShippedCase:
 
     case = job.case
     parts = pickle.dumps((case.problem, case.route, case.settings))
-    return ShippedCase(parts, tuple(map(str, files([case.problem], case.settings.at))), case.asked, job.found)
+    return ShippedCase(parts, tuple(map(str, files([case.problem.options], case.settings.at))), case.asked, job.found)

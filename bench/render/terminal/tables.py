@@ -79,7 +79,7 @@ def _narrow(table: Table, excess: int, unlimited: ConsoleOptions, out: Console) 
 
 def named(kind: registry.Kind, row: Row) -> str:
     """The selector of a row's problem or route, without its defaults."""
-    return selector_of(kind, row[kind], row[f"{kind}_options"])
+    return selector_of(kind, row[kind], row[f"{kind}_options"], row.get(f"{kind}_declared"))
 
 
 def titled(row: Row) -> str:

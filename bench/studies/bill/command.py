@@ -125,7 +125,8 @@ def run(
     problem_specs, route_specs = case.problems(problems), case.routes(routes)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu, sensitivities)
     count = len(problem_specs) * len(route_specs)
-    files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *case.files(problem_specs, at)])
+    inputs = case.files([spec.options for spec in problem_specs], at)
+    files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *inputs])
     if sensitivities is None:
         refuse_given(("sensitivities_of",), "is of --sensitivities")
         if vtu is None or route_specs[0].name != COLUMNS_OF:

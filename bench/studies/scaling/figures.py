@@ -67,7 +67,7 @@ def several_sizes(rows: Sequence[Row]) -> list[Row]:
 
 def curves(rows: Sequence[Row]) -> list[Row]:
     """Iterations that follow the size are no part of a curve's name: without them it has one row a size still."""
-    short = [row | {"route": without_following(row["by"], row["route_options"])} for row in rows]
+    short = [row | {"route": without_following(row)} for row in rows]
     sizes = grouped(short, lambda row: (row["route"], row["n_state"], row["n_param"]))
     several = {of[0]["route"] for of in sizes.values() if len(of) > 1}
     return [row if new["route"] in several else new for row, new in zip(rows, short, strict=True)]
@@ -75,9 +75,10 @@ def curves(rows: Sequence[Row]) -> list[Row]:
 
 def family(row: Row) -> str:
     """The problem without what makes its size, and the settings of its run where those are unusual."""
-    options = row["problem_options"] or {}
-    settings = str(row["problem"]).removeprefix(selector("problem", row["family"], options))
-    return selector("problem", row["family"], {k: v for k, v in options.items() if k not in SIZES}) + settings
+    named = row | {"problem": row["family"]}
+    settings = str(row["problem"]).removeprefix(selector("problem", named))
+    options = {k: v for k, v in (row["problem_options"] or {}).items() if k not in SIZES}
+    return selector("problem", named | {"problem_options": options}) + settings
 
 
 def dearest(rows: Sequence[Row]) -> str:

@@ -42,10 +42,7 @@ def left_out(rows: Sequence[Row]) -> Figure:
 
 def curves(rows: Sequence[Row]) -> Figure:
     """k of an unrolled route is no part of its name, for it follows the tolerance."""
-    rows = [
-        row | {"route": without_following(bare(row["route"]), row["route_options"]), "tolerance": swept(row)}
-        for row in rows
-    ]
+    rows = [row | {"route": without_following(row), "tolerance": swept(row)} for row in rows]
     columns = "problem route linear_solver sweep tolerance rtol adjoint_rtol gradient_error objective_error residual"
     return Figure(
         "tolerance",
@@ -61,10 +58,10 @@ def curves(rows: Sequence[Row]) -> Figure:
     )
 
 
-def without_following(route: str, options: Row | None) -> str:
-    """The selector of a route without the options that follow the problem or the tolerance."""
-    kept = {name: value for name, value in (options or {}).items() if name not in FOLLOWING}
-    return selector("route", route, kept)
+def without_following(row: Row) -> str:
+    """The selector of its route without the options that follow the problem or the tolerance."""
+    kept = {name: value for name, value in (row["route_options"] or {}).items() if name not in FOLLOWING}
+    return selector("route", row | {"route": bare(row["route"]), "route_options": kept})
 
 
 def panel(row: Row) -> str:
