@@ -10,6 +10,7 @@ from typing import Any
 
 from gradient_routes.bench.cases import declared, options, registry, selector
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.sources import source
@@ -156,7 +157,7 @@ def point(problem: Problem, at: str) -> Array:
         if truth is None:
             raise InputError(f"{problem.name}: the true parameters are not known - use --at start or --at FILE.csv")
         return problem.parameters.check(truth, f"{problem.name}, true")
-    columns = read_columns(at, None)
+    columns = read_columns(at, None, folder=located(""))
     if len(columns) != 1:
         raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
     return problem.parameters.check(next(iter(columns.values())), at)
@@ -171,4 +172,4 @@ def sized(spec: ProblemSpec, at: str) -> tuple[int, int]:
 def files(options: Iterable[dict[str, Any]], at: str) -> list[Path]:
     """The files that problems with these options and `at` read."""
     texts = [at, *(value for given in options for value in given.values() if isinstance(value, str))]
-    return [Path(text) for text in texts if os.path.isfile(text)]
+    return [Path(text) for text in texts if os.path.isfile(located(text))]

@@ -10,6 +10,7 @@ from typing import Any
 
 from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.column import declared as column_of
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
 from gradient_routes.bench.cases.options import Option
 from gradient_routes.bench.cases.registry import Kind
@@ -36,7 +37,7 @@ class Declared:
         """As it is kept; a file as the user wrote it."""
         written = Path(name.rpartition(":")[0])
         file = self.source.file
-        same = file is not None and written.suffix == ".py" and written.absolute() == Path(file)
+        same = file is not None and written.suffix == ".py" and located(written).resolve() == Path(file)
         kept: Row = clean({"defaults": self.defaults, "file": str(written) if same else file})
         return kept | {"module": self.source.module}
 
@@ -68,7 +69,7 @@ def source_of(column: Any) -> Source | None:
     module, file = (column.get(name) for name in ("module", "file")) if isinstance(column, dict) else (None, None)
     if not isinstance(module, str) or not isinstance(file, str | None):
         return None
-    return Source(None if file is None else str(Path(file).absolute()), module)
+    return Source(None if file is None else str(located(file)), module)
 
 
 def undeclared(rows: Iterable[Row]) -> str:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import STATUSES
 from gradient_routes.bench.cases.selector import Selector, parse
 from gradient_routes.bench.cases.suggest import did_you_mean
@@ -73,13 +74,13 @@ def as_expected(row: Row, expectations: Sequence[Expectation]) -> bool:
 def beside(path: Path) -> tuple[Expectation, ...]:
     """Those in the folder of a store, if any. Raises InputError."""
     file = path.parent / FILE
-    return read(file) if file.exists() else ()
+    return read(file) if located(file).exists() else ()
 
 
 def read(path: Path) -> tuple[Expectation, ...]:
     """The expectations of a file. Raises InputError for what is not as it should be."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(located(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error} - name a file of [[expected]] entries") from error
     except UnicodeDecodeError as error:

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.problems.errors import InputError
@@ -38,7 +39,7 @@ def imported(text: str) -> Any:
 
 
 def _module(where: str, text: str) -> ModuleType:
-    path = Path(where)
+    path = located(where)
     if path.suffix != ".py":
         return _loaded(lambda: importlib.import_module(where), text)
     if not path.is_file():

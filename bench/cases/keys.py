@@ -6,12 +6,12 @@ import hashlib
 import json
 import platform
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases import case, declared
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import versions
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.sources import Source, Stamp, digest, source, stamp, stamps
@@ -51,14 +51,14 @@ def content_key(case_key: str, problem: case.ProblemSpec, route: case.RouteSpec,
 
 def content_key_of(case_key: str, code: list[Source], problem_options: dict[str, Any], at: str) -> str:
     """The same, of what a row holds: files are read, nothing is run."""
-    data = [hashlib.sha256(file.read_bytes()).hexdigest() for file in case.files([problem_options], at)]
+    data = [hashlib.sha256(located(file).read_bytes()).hexdigest() for file in case.files([problem_options], at)]
     digests = [digest(each) for each in code]
     return hashed(case_key, digests, data, versions(), platform.python_version(), HARNESS)
 
 
 def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:
     """The files that a content key is of: as long as they are as they were, so is what it stands for."""
-    data = tuple(stamp(Path(file)) for file in case.files([problem.options], at))
+    data = tuple(stamp(located(file)) for file in case.files([problem.options], at))
     return (*stamps(source(problem.build)), *stamps(source(route.route)), *data)
 
 

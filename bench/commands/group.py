@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import click
 
+from gradient_routes.bench.cases.folder import from_here
 from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
@@ -26,7 +27,8 @@ class Routes(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         prepare_streams()
         try:
-            return super().invoke(ctx)
+            with from_here():
+                return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
             kept = FINISHED if ctx.invoked_subcommand == "run" else "nothing is kept"  # studies say so themselves
             complain(f"interrupted - {kept}{' '.join(map(str, interrupt.args))}")

@@ -19,6 +19,7 @@ from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.declared import beside
 from gradient_routes.bench.cases.environment import Environment, environment, fingerprint
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import ENVIRONMENTS, STORED, as_record, from_record, stored
 from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.cases.suggest import did_you_mean
@@ -47,22 +48,23 @@ class Store:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
+        self.file = located(path)  # code of others may change the working folder
 
     def check_writable(self) -> None:
         """Raise InputError now rather than after the first case. What is not there yet is not made."""
         with self._errors():
             self._refuse_folder()
             try:
-                os.stat(self.path)
+                os.stat(self.file)
             except FileNotFoundError:
-                there = next(folder for folder in self.path.absolute().parents if folder.exists())
+                there = next(folder for folder in self.file.parents if folder.exists())
                 tempfile.TemporaryFile(dir=there).close()
                 return
         with self._transaction():
             pass
 
     def _refuse_folder(self) -> None:
-        if self.path.is_dir():
+        if self.file.is_dir():
             raise InputError(f"store {self.path}: is a directory - name a file in it: {self.path}/routes.sqlite")
 
     def append(self, row: Row, samples: Samples | None, measured_in: Environment | None = None) -> None:
@@ -163,7 +165,7 @@ class Store:
 
     def latest(self, case_key: str | None = None) -> dict[str, Row]:
         """The newest row of every case by its case_key, or of the one given; none where there is no store yet."""
-        if not self.path.is_file() or self.path.stat().st_size == 0:
+        if not self.file.is_file() or self.file.stat().st_size == 0:
             return {}
         one = "" if case_key is None else "AND case_key = :case_key"
         newest = f"SELECT max(case_id) FROM cases WHERE case_key NOT NULL {one} GROUP BY case_key"
@@ -179,7 +181,7 @@ class Store:
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
         with self._errors():
-            if not self.path.is_file():
+            if not self.file.is_file():
                 raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
             with closing(sqlite3.connect(self._uri("rw"), uri=True, timeout=PATIENCE)) as db:
                 if not self._has_tables(db):
@@ -191,7 +193,7 @@ class Store:
     def _transaction(self) -> Iterator[sqlite3.Connection]:
         with self._errors():
             self._refuse_folder()
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.file.parent.mkdir(parents=True, exist_ok=True)
             with closing(sqlite3.connect(self._uri("rwc"), uri=True, timeout=PATIENCE, isolation_level=None)) as db:
                 db.execute("BEGIN IMMEDIATE")
                 if self._has_tables(db):
@@ -203,7 +205,7 @@ class Store:
                 db.execute("COMMIT")  # an exception before this leaves the file as it was
 
     def _uri(self, mode: str) -> str:
-        return f"{self.path.absolute().as_uri()}?mode={mode}"
+        return f"{self.file.as_uri()}?mode={mode}"
 
     @staticmethod
     def _has_tables(db: sqlite3.Connection) -> bool:

@@ -12,14 +12,16 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
 
-def read_columns(path: str | Path, names: tuple[str, ...] | None, optional: tuple[str, ...] = ()) -> dict[str, Array]:
+def read_columns(
+    path: str | Path, names: tuple[str, ...] | None, optional: tuple[str, ...] = (), folder: Path = Path()
+) -> dict[str, Array]:
     """Read the columns `names` (all of them, where None) of a CSV file as finite float64 arrays (n_rows,).
 
-    An empty cell in one of the columns `optional` is read as NaN.
+    A relative path starts from `folder`. An empty cell in one of the columns `optional` is read as NaN.
     Raises InputError for a file that cannot be read, a missing column, text, NaN or infinity, naming the line.
     """
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
+        with open(folder / path, newline="", encoding="utf-8-sig") as file:
             rows = [(i, row) for i, row in enumerate(csv.reader(file), start=1) if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         what = error.strerror if isinstance(error, OSError) else f"not a text file in CSV format ({error})"

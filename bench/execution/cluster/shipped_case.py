@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.execution.isolation.messages import Begun, Done
 from gradient_routes.problems.errors import InputError
 
@@ -59,9 +59,9 @@ class ShippedCase:
         from gradient_routes.bench.cases.keys import content_key
 
         start = time.perf_counter()
-        missing = [file for file in self.files if not os.path.isfile(file)]
+        missing = [file for file in self.files if not located(file).is_file()]
         if missing:
-            raise InputError(f"no file {missing[0]} in {os.getcwd()} - copy it there")
+            raise InputError(f"no file {missing[0]} in {located('')} - copy it there")
         if content_key(self.asked["case_key"], problem, route, at) != self.asked["content_key"]:
             raise InputError("its code, data or libraries are others than here - install and copy the same there")
         return time.perf_counter() - start

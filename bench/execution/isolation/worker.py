@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
+from gradient_routes.bench.cases.folder import from_here
 from gradient_routes.bench.execution.isolation.channel import SAID, Channel, ended
 from gradient_routes.bench.execution.isolation.inside import submit_to
 from gradient_routes.bench.execution.isolation.signals import STOPS
@@ -68,8 +69,9 @@ def main(descriptor: int) -> None:
     limits, parent, sys.path[:] = connection.recv()
     submit_to(limits, parent)
     stop = Stop(connection)
-    job = connection.recv()
-    stop.send_last(ended(job, Channel(stop.send, connection.recv)))
+    with from_here():
+        job = connection.recv()
+        stop.send_last(ended(job, Channel(stop.send, connection.recv)))
     sys.stderr.flush()
     os._exit(0)  # skip exit handlers of plug-ins and XLA
 

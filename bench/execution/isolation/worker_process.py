@@ -16,6 +16,7 @@ from multiprocessing import Pipe
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.channel import SAID, Job
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -47,7 +48,7 @@ class WorkerProcess:
                 talkative=echo,
                 last_words=STACK if last_words is None else (EXPIRED, last_words) if last_words else None,
                 pass_fds=[other.fileno()],
-                cwd=cwd,
+                cwd=cwd or located(""),
                 stdin=subprocess.DEVNULL,
             )
         with suppress(OSError):  # it has ended: hear() reports that

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.outcome import View
 from gradient_routes.bench.render.terminal.tables import named
 
@@ -19,7 +20,7 @@ def write(path: Path, views: Sequence[tuple[Row, View]]) -> None:
     reference. Raises OSError.
     """
     d = max((v.position.shape[1] for _, v in views if v.position is not None), default=0)
-    with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
+    with located(path).open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["problem", "route", "parameter", "unit", *AXES[:d], "p", "dJ_dp", "reference"])
         for row, view in views:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.outcome import Sensitivities
 from gradient_routes.bench.cases.settings import Columns
 from gradient_routes.problems.errors import InputError
@@ -43,11 +44,11 @@ def numbers(text: str) -> tuple[int, ...]:
 def write(path: Path, columns: Sensitivities) -> None:
     """As CSV, a row an unknown or a datum, or as NPZ. Raises OSError."""
     if path.suffix == ".npz":
-        with path.open("wb") as file:
+        with located(path).open("wb") as file:
             names = {"rows": columns.rows, "parameters": columns.parameters, "units": columns.units}
             np.savez(file, allow_pickle=False, **{columns.name: columns.values}, **names)
         return
-    with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as text:
+    with located(path).open("w", newline="", encoding="utf-8", errors="backslashreplace") as text:
         out = csv.writer(text, lineterminator="\n")
         out.writerow([columns.name, *columns.parameters])
         out.writerows([name, *row] for name, row in zip(columns.rows, columns.values.tolist(), strict=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Fields
 
@@ -15,6 +16,6 @@ def write(path: Path, fields: Fields) -> None:
     cell_data = {name: [values] for name, values in fields.cell_data.items()}
     try:
         mesh = Mesh(fields.points, [(fields.cell_type, fields.cells)], dict(fields.point_data), cell_data)
-        mesh.write(path, file_format="vtu")
+        mesh.write(located(path), file_format="vtu")
     except (WriteError, ValueError, KeyError) as error:
         raise InputError(f"--vtu {path}: fields do not fit the mesh: {error} - correct `Problem.fields`") from error

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.store.output_files import check_writable
 from gradient_routes.bench.verification.page import page
@@ -36,7 +37,7 @@ def conclude(say: Say, check: Check, what: Row, html: Path | None) -> int:
 def _written(check: Check, html: Path) -> Note:
     """What to say of the page: a result, or why it is lost."""
     try:
-        html.write_text(page(check), encoding="utf-8", errors="backslashreplace")
+        located(html).write_text(page(check), encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         return Note(f"--html {html}: {error.strerror or error} - name a file you may write")
     return Note(f"page in {html}", result=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gradient_routes.bench.cases import case
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.imported import imported
 from gradient_routes.bench.cases.study import Found, Say
@@ -93,8 +94,7 @@ def _subject(
 
 
 def _column(at: str) -> object:
-
-    columns = read_columns(at, None)
+    columns = read_columns(at, None, folder=located(""))
     if len(columns) != 1:
         raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
     return next(iter(columns.values()))
