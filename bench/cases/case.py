@@ -13,17 +13,21 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.cases.sources import source
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters, Problem
 from gradient_routes.routes.route import Route
 from gradient_routes.routes.synthetic_data import with_synthetic_data
 
+NOTHING: declared.Told = {}
+
 
 @dataclass(frozen=True)
 class ProblemSpec:
-    """A problem still to be built, its synthetic data, if it wants any, solved for."""
+    """A problem still to be built, its synthetic data, if it wants any, solved for.
+
+    `build` is its factory, or Declared where it is built in other processes only: they find its code by its name.
+    """
 
     name: str
     options: dict[str, Any]
@@ -46,7 +50,10 @@ class ProblemSpec:
 
 @dataclass(frozen=True)
 class RouteSpec:
-    """A route with its options as given; data-dependent defaults are still open (None)."""
+    """A route with its options as given; data-dependent defaults are still open (None).
+
+    `route` is Declared where it runs in other processes only.
+    """
 
     name: str
     route: Route
@@ -72,8 +79,7 @@ class Case:
 
 
 def _written(name: str, given: dict[str, Any], target: Any) -> str:
-    declared = options.options_of(registry.factory_of(target))
-    return selector.written(name, given, {name: option.default for name, option in declared.items()})
+    return selector.written(name, given, declared.declared_by(target).defaults)
 
 
 def selector_of(kind: registry.Kind, name: str, given: dict[str, Any] | None, kept: Any = None) -> str:
@@ -100,25 +106,29 @@ def route_named(name: str, options: dict[str, Any]) -> RouteSpec:
     return RouteSpec(name, _target("route", name), options)
 
 
-def _target(kind: registry.Kind, name: str) -> Any:
-    """What the user named: code that is not registered is imported, and what it declares is known from then on."""
-    target = registry.find(kind, name).load()
+def _target(kind: registry.Kind, name: str, told: declared.Told = NOTHING) -> Any:
+    """What the user named, or what `told` describes in its place; what its code declares is known from then on."""
+    target = told.get((kind, name)) or registry.find(kind, name).load()
     if is_reference(name):
-        found = options.options_of(registry.factory_of(target))
-        declared.remember(kind, name, declared.Declared(found, source(target)))
+        declared.remember(kind, name, declared.declared_by(target))
     return target
 
 
-def problems(selectors: Iterable[str]) -> list[ProblemSpec]:
-    """All problems that the selectors name, grids expanded. Raises InputError."""
-    return [ProblemSpec(name, opts, target) for name, opts, target in _specs("problem", selectors)]
+def problems(selectors: Iterable[str], told: declared.Told = NOTHING) -> list[ProblemSpec]:
+    """All problems that the selectors name, grids expanded; the code of those that `told` describes is not imported.
+
+    Raises InputError, RoutesError where code of the user's own fails.
+    """
+    return [ProblemSpec(name, opts, target) for name, opts, target in _specs("problem", selectors, told)]
 
 
-def routes(selectors: Iterable[str]) -> list[RouteSpec]:
-    """All routes that the selectors name, grids expanded. Raises InputError."""
-    specs = [RouteSpec(name, target, opts) for name, opts, target in _specs("route", selectors)]
-    for spec in specs:
-        spec.route.check(**spec.options)
+def routes(selectors: Iterable[str], told: declared.Told = NOTHING) -> list[RouteSpec]:
+    """All routes that the selectors name, as `problems` does."""
+    specs = []
+    for name, opts, target in _specs("route", selectors, told):
+        if ("route", name) not in told:  # where it was described options have been checked
+            target.check(**opts)
+        specs.append(RouteSpec(name, target, opts))
     return specs
 
 
@@ -129,7 +139,9 @@ def left_out(problem_selectors: Iterable[str], route_selectors: Iterable[str]) -
     return [failure for entry in entries if (failure := entry.failure) is not None]
 
 
-def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str, dict[str, Any], Any]]:
+def _specs(
+    kind: registry.Kind, selectors: Iterable[str], told: declared.Told
+) -> Iterator[tuple[str, dict[str, Any], Any]]:
     seen: list[tuple[str, dict[str, Any]]] = []
     for text in selectors:
         chosen = selector.parse(text)
@@ -140,9 +152,10 @@ def _specs(kind: registry.Kind, selectors: Iterable[str]) -> Iterator[tuple[str,
         else:
             names = [chosen.name]
         for name in names:
-            target = _target(kind, name)
+            target = _target(kind, name, told)
+            known = declared.declared_by(target).options
             for given in chosen.expand():
-                resolved = options.resolve(registry.factory_of(target), given, name)
+                resolved = options.resolve(known, given, name)
                 if (name, resolved) not in seen:
                     seen.append((name, resolved))
                     yield name, resolved, target

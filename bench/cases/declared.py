@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 import itertools
+import json
+import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin
 
 from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.column import declared as column_of
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
-from gradient_routes.bench.cases.options import Option
-from gradient_routes.bench.cases.registry import Kind
+from gradient_routes.bench.cases.options import Option, options_of
+from gradient_routes.bench.cases.registry import Kind, factory_of, is_route
 from gradient_routes.bench.cases.row import clean
-from gradient_routes.bench.cases.sources import Source
+from gradient_routes.bench.cases.sources import Source, source
+from gradient_routes.problems.errors import InputError
 
 KINDS: tuple[Kind, ...] = ("problem", "route")
 _KNOWN: dict[tuple[Kind, str], Declared] = {}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Declared:
-    """The options of a problem or a route, and where its code is: what is needed of it without running it."""
+    """The options of a problem or a route, where its code is, what a route calls itself: what is needed without running
+    it. It stands in place of the code where that is not imported.
+    """
 
     options: Mapping[str, Option]
     source: Source
+    name: str = ""
 
     @property
     def defaults(self) -> Row:
@@ -41,6 +48,39 @@ class Declared:
         kept: Row = clean({"defaults": self.defaults, "file": str(written) if same else file})
         return kept | {"module": self.source.module}
 
+    def plain(self, who: str) -> Declared:
+        """Without types of its own code, which another process does not have. Raises InputError for such a default."""
+        for option in self.options.values():
+            try:
+                json.dumps(clean(option.default))
+            except TypeError as error:
+                raise InputError(
+                    f"{who}: default of {option.name}: {error} - give a number, a text or None, and convert it inside"
+                ) from None
+        plain = [replace(o, kinds=tuple(map(_plain, o.kinds)), help=str(o.help)) for o in self.options.values()]
+        return replace(self, options={option.name: option for option in plain})
+
+
+def _plain(kind: Any) -> Any:
+    """A type that options are converted to; object for others, to which no text is."""
+    values = get_args(kind) if get_origin(kind) is Literal else ()
+    literal = values and all(type(value) in (str, int, float, bool, NoneType) for value in values)
+    return kind if literal or kind in (str, int, float, bool, NoneType) else object
+
+
+Told = Mapping[tuple[Kind, str], Declared]  # what another process has found
+
+
+def declared_by(target: Any) -> Declared:
+    """What code declares, which may have been described elsewhere."""
+    if isinstance(target, Declared):
+        return target
+    return Declared(options_of(factory_of(target)), source(target), str(target.name) if is_route(target) else "")
+
+
+def source_by(target: Any) -> Source:
+    return target.source if isinstance(target, Declared) else source(target)
+
 
 def remember(kind: Kind, name: str, declared: Declared) -> None:
     """What this process knows of it from now on."""
@@ -50,6 +90,12 @@ def remember(kind: Kind, name: str, declared: Declared) -> None:
 def known(kind: Kind, name: str) -> Declared | None:
     """What this process has been told: its code has been imported here or in a process that was started for it."""
     return _KNOWN.get((kind, name))
+
+
+def is_foreign(module: str) -> bool:
+    """Whether it is of the package of code that has been described here and is not imported."""
+    tops = {each.source.module.partition(".")[0] for each in _KNOWN.values()}
+    return module.partition(".")[0] in tops and module not in sys.modules
 
 
 def kept(kind: Kind, name: str | None) -> Row | None:

@@ -14,7 +14,7 @@ from typing import Any
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.suggest import did_you_mean
-from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.errors import InputError, RoutesError
 
 
 def is_reference(text: str) -> bool:
@@ -23,7 +23,7 @@ def is_reference(text: str) -> bool:
 
 
 def imported(text: str) -> Any:
-    """The object that `text` points to. Raises InputError for what cannot be found or imported."""
+    """The object that `text` points to. Raises InputError for what cannot be found, RoutesError where it fails."""
     where, _, name = text.rpartition(":")
     if not where or not name:
         raise InputError(f"'{text}' - write FILE.py:NAME or package.module:NAME")
@@ -72,6 +72,10 @@ def _loaded(load: Callable[[], ModuleType], text: str) -> ModuleType:
     try:
         with stdout_to_stderr():
             return load()
+    except MemoryError:
+        raise
     except (Exception, SystemExit) as error:  # code of others may raise anything while it is imported
         said = " ".join(str(error).split())
-        raise InputError(f"'{text}' cannot be imported: {type(error).__name__}: {said} - mend it") from error
+        absent = isinstance(error, ModuleNotFoundError) and text.startswith(f"{error.name}")
+        kind = InputError if absent else RoutesError  # a wrong name, or code that fails
+        raise kind(f"'{text}' cannot be imported: {type(error).__name__}: {said} - mend it") from error

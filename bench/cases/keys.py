@@ -10,11 +10,12 @@ from typing import Any
 
 from gradient_routes.bench.cases import case, declared
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.declared import source_by
 from gradient_routes.bench.cases.environment import versions
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.cases.sources import Source, Stamp, digest, source, stamp, stamps
+from gradient_routes.bench.cases.sources import Source, Stamp, digest, stamp, stamps
 
 HARNESS = 5  # raised when rows come to mean something else: all that was kept before is then stale
 
@@ -46,7 +47,7 @@ def settings_of(settings: Settings, threads: int) -> dict[str, Any]:
 
 def content_key(case_key: str, problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> str:
     """Another one where code, data, libraries or the harness have changed."""
-    return content_key_of(case_key, [source(problem.build), source(route.route)], problem.options, at)
+    return content_key_of(case_key, [source_by(problem.build), source_by(route.route)], problem.options, at)
 
 
 def content_key_of(case_key: str, code: list[Source], problem_options: dict[str, Any], at: str) -> str:
@@ -59,7 +60,7 @@ def content_key_of(case_key: str, code: list[Source], problem_options: dict[str,
 def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:
     """The files that a content key is of: as long as they are as they were, so is what it stands for."""
     data = tuple(stamp(located(file)) for file in case.files([problem.options], at))
-    return (*stamps(source(problem.build)), *stamps(source(route.route)), *data)
+    return (*stamps(source_by(problem.build)), *stamps(source_by(route.route)), *data)
 
 
 def hashed(*parts: Any) -> str:

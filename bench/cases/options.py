@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import math
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -66,9 +66,8 @@ def _kinds(annotation: Any) -> tuple[Any, ...]:
     return (annotation,)
 
 
-def resolve(factory: Callable[..., Any], given: dict[str, str], who: str) -> dict[str, Any]:
-    """All options of `factory`: defaults, overridden by the texts `given`. Raises InputError."""
-    options = options_of(factory)
+def resolve(options: Mapping[str, Option], given: dict[str, str], who: str) -> dict[str, Any]:
+    """All options: defaults, overridden by the texts `given`. Raises InputError."""
     unknown = [name for name in given if name not in options]
     if unknown:
         known = did_you_mean(unknown[0], options)

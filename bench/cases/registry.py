@@ -54,6 +54,8 @@ class Entry:
         except InputError:
             raise
         except (Exception, SystemExit) as error:  # a plug-in may raise anything while it is imported
+            if isinstance(self.point, Pointer):
+                raise  # it says so itself
             said = " ".join(str(error).split())
             raise InputError(
                 f"{self.kind} '{self.name}' of {self.origin} cannot be imported: {type(error).__name__}: {said}"

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     Executing = Callable[[bool, Limits, bool], How]  # isolate, limits, timed
 
 STOPS = "Wall time [s] after which {} is stopped and, {:g} s later, killed with its child processes; inf: none."
-ISOLATE = "Run in a separate process, whose stdin is empty; needed for --timeout and --memory."
+ISOLATE = (
+    "Run in a separate process, whose stdin is empty; needed for --timeout and --memory. With --no-isolate this process"
+    " imports FILE.py:NAME itself: code that ends or hangs ends or hangs the command."
+)
 KILLS = "Wall time [s] after which {} is killed with its child processes; inf: none."
 MEMORY = "Resident memory at which it is killed, as 4GiB or 500MB. [all of the machine]"
 THREADS = "Number of threads of each of BLAS, PARDISO and XLA."

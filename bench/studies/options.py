@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
+    from gradient_routes.bench.cases.declared import Told
     from gradient_routes.bench.cases.study import Say
     from gradient_routes.problems.problem import Array, Problem
 
@@ -42,12 +43,12 @@ def one_route(selector: str) -> RouteSpec:
     return specs[0]
 
 
-def routes_of(selectors: Sequence[str], say: Say) -> list[RouteSpec]:
+def routes_of(selectors: Sequence[str], say: Say, told: Told | None = None) -> list[RouteSpec]:
     """The routes that selectors name; what `all` leaves out is said. Raises InputError."""
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.study import Note
 
-    specs = case.routes(selectors)
+    specs = case.routes(selectors, told or case.NOTHING)
     for left_out in case.left_out([], selectors):
         say(Note(f"left out of 'all': {left_out}"))
     return specs

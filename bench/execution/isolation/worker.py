@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import os
+import pickle
 import signal
 import sys
 from multiprocessing.connection import Connection
@@ -57,6 +58,18 @@ class Stop:
         self._waiting = True
 
 
+class Sent:
+    """A job as it was sent: putting it together imports code of others, which may fail or end the process."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self.name = data, "import"
+
+    def __call__(self, channel: Channel) -> None:
+        job = pickle.loads(self._data)
+        self.name = job.name
+        job(channel)
+
+
 def main(descriptor: int) -> None:
     """Do the job that arrives on a descriptor."""
     os.set_inheritable(descriptor, False)  # processes that the job starts must not hold the connection open
@@ -70,8 +83,7 @@ def main(descriptor: int) -> None:
     submit_to(limits, parent)
     stop = Stop(connection)
     with from_here():
-        job = connection.recv()
-        stop.send_last(ended(job, Channel(stop.send, connection.recv)))
+        stop.send_last(ended(Sent(connection.recv_bytes()), Channel(stop.send, connection.recv)))
     sys.stderr.flush()
     os._exit(0)  # skip exit handlers of plug-ins and XLA
 

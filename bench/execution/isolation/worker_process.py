@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+import pickle
 import signal
 import socket
 import subprocess
@@ -16,6 +18,7 @@ from multiprocessing import Pipe
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from gradient_routes.bench.cases.declared import is_foreign
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.channel import SAID, Job
@@ -25,6 +28,16 @@ from gradient_routes.bench.execution.isolation.process import STACK, Confined, K
 from gradient_routes.bench.execution.isolation.signals import EXPIRED, STOPS, blocked
 
 WORKER = "gradient_routes.bench.execution.isolation.worker"
+
+
+class Loaded(pickle.Unpickler):
+    """A message, put together without importing a module of the user's own."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Raises UnpicklingError for what is of such a module."""
+        if is_foreign(module):
+            raise pickle.UnpicklingError(f"{module}.{name} is not imported here")
+        return super().find_class(module, name)
 
 
 class WorkerProcess:
@@ -118,7 +131,7 @@ class WorkerProcess:
         message: Message = ()
         while message is not None:
             try:
-                said, message = self.connection.recv()
+                said, message = Loaded(io.BytesIO(self.connection.recv_bytes())).load()
                 assert said == SAID
             except Exception:
                 message = None

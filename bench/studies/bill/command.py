@@ -111,6 +111,7 @@ def run(
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.partial import chosen
     from gradient_routes.bench.cases.settings import Settings
+    from gradient_routes.bench.execution.describing import described
     from gradient_routes.bench.execution.isolation.signals import Interrupt, interruptible
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.store import Store
@@ -122,7 +123,8 @@ def run(
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     partial = chosen(components, directions, seed)
     how = executing(isolate, limits, timed)
-    problem_specs, route_specs = case.problems(problems), case.routes(routes)
+    told = described(problems, routes, limits) if isolate else case.NOTHING
+    problem_specs, route_specs = case.problems(problems, told), case.routes(routes, told)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu, sensitivities)
     count = len(problem_specs) * len(route_specs)
     inputs = case.files([spec.options for spec in problem_specs], at)

@@ -16,6 +16,7 @@ from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.study import Found, Kept, Say
 from gradient_routes.bench.command_options import checked, debugging, refuse_given
+from gradient_routes.bench.execution.describing import described
 from gradient_routes.bench.execution.executors.isolated import called
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.sweep import How
@@ -27,7 +28,7 @@ from gradient_routes.bench.studies.options import routes_of
 from gradient_routes.bench.studies.scaling.break_even import BreakEvens, Racing, break_even
 from gradient_routes.bench.studies.scaling.climbing import Series
 from gradient_routes.bench.studies.scaling.measure import scaling
-from gradient_routes.bench.studies.scaling.sizes import Sizes, sizes
+from gradient_routes.bench.studies.scaling.sizes import Count, Sizes, sizes, unknowns
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.routes.newton import Solver
 
@@ -51,8 +52,10 @@ def run(
     """Ctrl-C ends the study, not what it has measured."""
     if not 0 <= min_time < float("inf"):
         raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
-    asked = sizes_of(case.problems([selector]), first, growth, levels)
-    specs = routes_of(routes, say)
+    told = described([selector], routes, limits) if isolate else case.NOTHING
+    count = (lambda spec: int(called(unknowns, (spec,), limits))) if told else unknowns
+    asked = sizes_of(case.problems([selector], told), first, growth, levels, count)
+    specs = routes_of(routes, say, told)
     settings = Settings(at, checked(budget), min_time, solver=solver)
     lost: list[str] = []
     measure = partial(run_cases, how=How(isolate, limits))
@@ -81,7 +84,7 @@ def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], setti
     return found
 
 
-def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels: int) -> Sizes:
+def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels: int, count: Count) -> Sizes:
     """What to measure on. Raises InputError."""
     if not 1.0 < growth < float("inf") or levels < 1:
         raise InputError(f"--growth {growth:g} --levels {levels} - give a growth > 1 and at least one level")
@@ -89,7 +92,7 @@ def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels:
         refuse_given(("growth", "levels"), "the sizes are those of the grid")
         if first is not None:
             raise InputError("--from: the sizes are those of the grid - leave it out")
-    return sizes(specs, first, growth, levels)
+    return sizes(specs, first, growth, levels, count)
 
 
 def tell(row: Row | None) -> None:

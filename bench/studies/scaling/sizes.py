@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import ProblemSpec
-from gradient_routes.bench.cases.options import options_of
+from gradient_routes.bench.cases.declared import declared_by
 from gradient_routes.problems.errors import InputError, RoutesError
+
+Count = Callable[[ProblemSpec], int]
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,22 @@ class Sizes:
         return float(math.prod(spec.options[name] for name in self.varied))
 
 
-def sizes(specs: Sequence[ProblemSpec], first: int | None, growth: float, levels: int) -> Sizes:
-    """The grid as it is, or, of a single problem, `levels` of them. Raises InputError."""
-    return grid(specs) if len(specs) > 1 else climb(specs[0], first, growth, levels)
+def unknowns(spec: ProblemSpec) -> int:
+    """n_u. Raises InputError."""
+    try:
+        return spec().n_state
+    except RoutesError:
+        raise
+    except Exception as failure:  # of a plug-in
+        said = " ".join(str(failure).split())
+        raise InputError(f"problem '{spec.name}' cannot be built: {type(failure).__name__}: {said} - mend it") from None
+
+
+def sizes(
+    specs: Sequence[ProblemSpec], first: int | None, growth: float, levels: int, count: Count = unknowns
+) -> Sizes:
+    """The grid as it is, or, of a single problem, `levels` of them, unknowns by `count`. Raises InputError."""
+    return grid(specs) if len(specs) > 1 else climb(specs[0], first, growth, levels, count)
 
 
 def grid(specs: Sequence[ProblemSpec]) -> Sizes:
@@ -51,12 +65,12 @@ def grid(specs: Sequence[ProblemSpec]) -> Sizes:
     return replace(of, specs=tuple(sorted(specs, key=of.magnitude)))
 
 
-def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int) -> Sizes:
+def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int, count: Count) -> Sizes:
     """n such that the unknowns grow by `growth` a level, from `first` or the n given. Raises InputError."""
     if levels == 1 and first is None:
         return Sizes((spec,), ("n",) if "n" in spec.options else ())
     start = _start(spec, first)
-    per_n = _dimension(spec, start)
+    per_n = _dimension(spec, start, count)
     ns = [start]
     for level in range(1, levels):
         ns.append(max(ns[-1] + 1, round(start * growth ** (level / per_n))))
@@ -64,7 +78,7 @@ def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int) -> S
 
 
 def _start(spec: ProblemSpec, first: int | None) -> int:
-    option = options_of(registry.factory_of(spec.build)).get("n")
+    option = declared_by(spec.build).options.get("n")
     if option is None or int not in option.kinds:
         raise InputError(f"{spec.name}: has no whole number n to climb by - give a grid: '{spec.name}[KEY=1|2|4]'")
     start = spec.options["n"] if first is None else first
@@ -77,19 +91,9 @@ def _sized(spec: ProblemSpec, n: int) -> ProblemSpec:
     return replace(spec, options=spec.options | {"n": n})
 
 
-def _dimension(spec: ProblemSpec, n: int) -> float:
+def _dimension(spec: ProblemSpec, n: int, count: Count) -> float:
     """d of n_u ~ n^d, by what twice as much n gives."""
-    few, many = (_unknowns(_sized(spec, size)) for size in (n, 2 * n))
+    few, many = (count(_sized(spec, size)) for size in (n, 2 * n))
     if few >= many:
         raise InputError(f"{spec.name}: n={n} has {few} unknowns, n={2 * n} has {many} - give a grid of sizes")
     return math.log2(many / few)
-
-
-def _unknowns(spec: ProblemSpec) -> int:
-    try:
-        return spec().n_state
-    except RoutesError:
-        raise
-    except Exception as failure:  # of a plug-in
-        said = " ".join(str(failure).split())
-        raise InputError(f"problem '{spec.name}' cannot be built: {type(failure).__name__}: {said} - mend it") from None
