@@ -20,7 +20,10 @@ from gradient_routes.bench.execution.measurement import Measure
 from gradient_routes.bench.execution.pruning import Pruning, Size
 from gradient_routes.bench.execution.references import KnownJudges
 from gradient_routes.bench.execution.survey import sizes
+from gradient_routes.bench.store.claims import Claims
 from gradient_routes.bench.units import now
+
+Group = tuple[ProblemSpec, Size | None, list[RouteSpec]]  # the routes on one problem
 
 
 @dataclass(frozen=True)
@@ -57,12 +60,14 @@ def run(
     settings: Settings,
     how: How = HERE,
     wanted: Callable[[Row], bool] = everything,
+    claims: Claims | None = None,
 ) -> Generator[Outcome]:
     """All pairs that are wanted, problem by problem; each outcome as soon as it is known.
 
-    InputError and DomainError for problems that cannot be come before anything is measured.
+    With `claims`, what another runner has claimed comes last, if it is still wanted then. InputError and DomainError
+    for problems that cannot be come before anything is measured.
     """
-    return Sweep(problems, routes, settings, how, wanted).outcomes()
+    return Sweep(problems, routes, settings, how, wanted, claims).outcomes()
 
 
 class Sweep:
@@ -75,12 +80,14 @@ class Sweep:
         settings: Settings,
         how: How,
         wanted: Callable[[Row], bool],
+        claims: Claims | None = None,
     ) -> None:
-        self.routes, self.settings, self.how, self.wanted = routes, settings, how, wanted
-        self.problems = [p for p in problems if any(wanted(self._asked(p, route)) for route in routes)]
+        self.settings, self.how, self.wanted, self.claims = settings, how, wanted, claims
+        todo = [p for p in problems if any(wanted(self._asked(p, route)) for route in routes)]
         guarded = how.limits if how.isolate else None
-        alone = len(self.problems) == 1
-        self.sizes: list[Size | None] = [None] if alone else sizes(self.problems, settings, guarded)
+        known: list[Size | None] = [None] if len(todo) == 1 else sizes(todo, settings, guarded)
+        self.groups: list[Group] = [(problem, size, routes) for problem, size in zip(todo, known, strict=True)]
+        self.held: list[Group] = []  # by other runners, one route each
         self.pruning = Pruning()
         self._places = itertools.count()
         self._started: dict[str, tuple[int, Case, Size | None]] = {}
@@ -93,17 +100,23 @@ class Sweep:
                 raise outcome.refusal
             begun = True
             yield outcome
+            if self.claims is not None:  # its row is stored
+                self.claims.release(outcome.row["case_key"])
 
     def _outcomes(self) -> Iterator[Outcome]:
-        for outcome in self._side_by_side() if self.how.jobs > 1 or self.how.cluster else self._one_by_one():
-            place, case, size = self._started.pop(outcome.row["case_key"])
-            self.pruning.note(case.problem, case.route, size, outcome.row)
-            yield replace(outcome, place=place)
+        while self.groups:
+            for outcome in self._side_by_side() if self.how.jobs > 1 or self.how.cluster else self._one_by_one():
+                place, case, size = self._started.pop(outcome.row["case_key"])
+                self.pruning.note(case.problem, case.route, size, outcome.row)
+                yield replace(outcome, place=place)
+            self.groups, self.held = self.held, []
+            if self.claims is not None and self.groups:
+                self.claims.wait([self._asked(problem, route)["case_key"] for problem, _, (route,) in self.groups])
 
     def _one_by_one(self) -> Iterator[Outcome]:
-        for problem, size in zip(self.problems, self.sizes, strict=True):
+        for group in self.groups:
             pruned: list[Outcome] = []
-            jobs = list(self._jobs([(problem, size)], pruned))
+            jobs = list(self._jobs([group], pruned))
             yield from pruned
             if jobs:
                 yield from self._group(jobs)
@@ -123,7 +136,7 @@ class Sweep:
         from gradient_routes.bench.execution.executors import pool
 
         pruned: list[Outcome] = []
-        jobs = self._jobs(zip(self.problems, self.sizes, strict=True), pruned)
+        jobs = self._jobs(self.groups, pruned)
         run = self.how.cluster.outcomes if self.how.cluster is not None else pool.outcomes
         for outcome in run(jobs, self.how.jobs, self.how.limits):
             yield outcome
@@ -131,14 +144,21 @@ class Sweep:
                 yield pruned.pop(0)
         yield from pruned
 
-    def _jobs(self, problems: Iterable[tuple[ProblemSpec, Size | None]], pruned: list[Outcome]) -> Iterator[Measure]:
-        """What is wanted; what is not worth trying goes among the pruned."""
-        for problem, size in problems:
+    def _jobs(self, groups: Iterable[Group], pruned: list[Outcome]) -> Iterator[Measure]:
+        """What is wanted; what is not worth trying goes among the pruned, what others run among the held."""
+        for problem, size, routes in groups:
             found: KnownJudges = {}
-            for route in self.routes:
+            for route in routes:
                 case = Case(problem, route, self.settings, self._asked(problem, route))
                 if not self.wanted(case.asked):
                     continue
+                if self.claims is not None:
+                    if not self.claims.take(case.asked["case_key"]):
+                        self.held.append((problem, size, [route]))
+                        continue
+                    if not self.wanted(case.asked):  # whoever held it has done it
+                        self.claims.release(case.asked["case_key"])
+                        continue
                 self._started[case.asked["case_key"]] = next(self._places), case, size
                 reason = self.pruning.reason(problem, route, size)
                 if reason is None:

@@ -29,9 +29,14 @@ def state_of(row: Row, kept: Row | None, expected: Callable[[Row], bool] = lambd
 
 
 def still_open(store: Store, states: tuple[State, ...], expected: Callable[[Row], bool]) -> Callable[[Row], bool]:
-    """Whether a case is in one of `states`: asked when its turn comes, for another runner may have done it."""
+    """Whether a case is in one of `states` and no other runner has tried it since: asked when its turn comes."""
+    before = store.newest()
 
     def wanted(row: Row) -> bool:
-        return state_of(row, store.latest(row["case_key"]).get(row["case_key"]), expected) in states
+        kept = store.latest(row["case_key"]).get(row["case_key"])
+        if state_of(row, kept, expected) not in states:
+            return False
+        tried = kept is not None and kept["content_key"] == row["content_key"]
+        return not (tried and store.newest(row["case_key"]) > before)
 
     return wanted

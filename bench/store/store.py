@@ -50,6 +50,12 @@ class Store:
         self.path = Path(path)
         self.file = located(path)  # code of others may change the working folder
 
+    @property
+    def claims(self) -> Path:
+        """The file of locks on its cases, beside it."""
+        path = self.file.resolve()
+        return path.with_name(f"{path.name}-claims")
+
     def check_writable(self) -> None:
         """Raise InputError now rather than after the first case. What is not there yet is not made."""
         with self._errors():
@@ -165,18 +171,28 @@ class Store:
 
     def latest(self, case_key: str | None = None) -> dict[str, Row]:
         """The newest row of every case by its case_key, or of the one given; none where there is no store yet."""
-        if not self.file.is_file() or self.file.stat().st_size == 0:
-            return {}
         one = "" if case_key is None else "AND case_key = :case_key"
         newest = f"SELECT max(case_id) FROM cases WHERE case_key NOT NULL {one} GROUP BY case_key"
+        found = self._keyed(f"SELECT * FROM cases WHERE case_id IN ({newest})", case_key)
+        rows = [from_record(self._parsed("cases", record)) for record in found]
+        return {row["case_key"]: row for row in rows}
+
+    def newest(self, case_key: str | None = None) -> int:
+        """The case_id of the row added last, or of the last one of a case; 0 where there is none."""
+        one = "" if case_key is None else "WHERE case_key = :case_key"
+        found = self._keyed(f"SELECT coalesce(max(case_id), 0) AS case_id FROM cases {one}", case_key)
+        return max((int(record["case_id"]) for record in found), default=0)
+
+    def _keyed(self, query: str, case_key: str | None) -> list[Row]:
+        """What a query of keys finds; nothing where there is no store yet, or one from before there were keys."""
+        if not self.file.is_file() or self.file.stat().st_size == 0:
+            return []
         with self._reading() as db:
             if "case_key" not in {column[1] for column in db.execute("PRAGMA table_info(cases)")}:
-                return {}  # of an older schema
-            cursor = db.execute(f"SELECT * FROM cases WHERE case_id IN ({newest})", {"case_key": case_key})
+                return []  # of an older schema
+            cursor = db.execute(query, {"case_key": case_key})
             names = [d[0] for d in cursor.description]
-            records = [dict(zip(names, record, strict=True)) for record in cursor]
-        rows = [from_record(self._parsed("cases", record)) for record in records]
-        return {row["case_key"]: row for row in rows}
+            return [dict(zip(names, record, strict=True)) for record in cursor]
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:

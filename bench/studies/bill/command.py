@@ -113,7 +113,9 @@ def run(
     from gradient_routes.bench.cases.settings import Settings
     from gradient_routes.bench.execution.describing import described
     from gradient_routes.bench.execution.isolation.signals import Interrupt, interruptible
+    from gradient_routes.bench.execution.sweep import everything
     from gradient_routes.bench.execution.sweep import run as run_cases
+    from gradient_routes.bench.store.claims import Claims
     from gradient_routes.bench.store.store import Store
     from gradient_routes.bench.studies.bill.done import Done
     from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
@@ -143,7 +145,8 @@ def run(
     wanted = _wanted(store, resume, only, known)
     if store is not None:
         store.check_writable()
-    outcomes = run_cases(problem_specs, route_specs, settings, how, wanted)
+    claims = None if store is None or wanted is everything else Claims(store)
+    outcomes = run_cases(problem_specs, route_specs, settings, how, wanted, claims)
     done = Done(store, as_json, known, views=gradient is not None or files.fields)
     interruptible()  # SIGTERM acts like Ctrl-C
     try:
