@@ -7,6 +7,7 @@ selector ("bar", "bar[n=64]", "model.py:Model") or a Problem, a route a selector
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack, get_args
@@ -76,7 +77,8 @@ def run(
     seed        of these
     budget      gradients that are predicted to take more seconds are skipped
     min_time    seconds of steady calls to time; none where `timing` is False
-    store       where rows are kept, too; for problems and routes named by selectors
+    store       where rows are kept, too; for problems and routes named by selectors. A warning names the file of those
+                that it did not take
     solver      options of the forward solve, see SolverOptions
 
     Returns one row a case, in the order asked for, with the columns that results/README.md describes: seconds, bytes,
@@ -96,6 +98,7 @@ def run(
     Raises InputError for what cannot be run, and where pandas is not installed (pip install 'gradient-routes[frames]').
     """
     from gradient_routes.bench.execution.sweep import run as run_cases
+    from gradient_routes.bench.store.keeping import Keeper
 
     if not 0 <= min_time < float("inf"):
         raise InputError(f"run: min_time={min_time:g} - give seconds >= 0")
@@ -109,11 +112,14 @@ def run(
             raise InputError("run: a store keeps what can be named again - give problem and route as selectors")
         kept.check_writable()
     frame((), (), ())  # before anything is measured: pandas may be missing
-    outcomes = []
-    for outcome in run_cases(problems, routes, settings):
-        if kept is not None:
-            kept.append(outcome.row, outcome.samples, outcome.environment)
-        outcomes.append(outcome)
+    outcomes, keeper = [], Keeper(kept)
+    try:
+        for outcome in run_cases(problems, routes, settings):
+            keeper.append(outcome.row, outcome.samples, outcome.environment)
+            outcomes.append(outcome)
+    finally:  # after an interrupt, too
+        if apart := keeper.close():
+            warnings.warn(f"run: {apart}", stacklevel=2)
     rows = [outcome.row for outcome in sorted(outcomes, key=lambda outcome: outcome.place)]
     return frame(STORED, [column.name for column in STORED], map(as_record, rows))
 

@@ -9,12 +9,13 @@ from gradient_routes.bench.commands.completion import with_completion
 from gradient_routes.bench.commands.export import export
 from gradient_routes.bench.commands.group import Routes
 from gradient_routes.bench.commands.list import list_
+from gradient_routes.bench.commands.merge import merge
 from gradient_routes.bench.commands.report import report
 from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
 from gradient_routes.bench.studies.command import commands_of_studies
 
-OTHERS: list[click.Command] = [list_, status, report, export, compare, baseline]
+OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
 
@@ -29,6 +30,9 @@ def main() -> None:
     routes run --problem 'bar[n=8|64]' --route all
     routes vcurve --problem bar --route adjoint  a verdict, by finite differences
     routes check my_model.py:Model               the same for your own code
+
+    A file that an option names is written whole or not at all. An earlier one of the same kind is replaced. A source,
+    a store, what the command reads, any other file, or a link to one of these is refused.
 
     Shell completion: eval "$(_ROUTES_COMPLETE=bash_source routes)" in ~/.bashrc; zsh_source in ~/.zshrc; in
     ~/.config/fish/completions/routes.fish: _ROUTES_COMPLETE=fish_source routes | source

@@ -106,6 +106,11 @@ def checked(budget: float) -> float:
     return budget
 
 
+def replaces(*suffixes: str) -> str:
+    """What the help of an option says of the file that it names: see store/output_files.py."""
+    return f"Replaces an earlier {' or '.join(suffixes)}, no other file."
+
+
 def complain(what: str) -> None:
     """Print one line on stderr, without line breaks and control characters of names in it."""
     try:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext, redirect_stdout
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gradient_routes.bench.command_options import debug_option, store_option
+from gradient_routes.bench.command_options import debug_option, replaces, store_option
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.regression.compare import Comparison
+    from gradient_routes.bench.store.output_files import Output
 
 BASELINE = Path("results") / "baseline.json"
 PATH = click.Path(path_type=Path)
 FACTOR = "Times are worse if their median grows by this factor and a rank test confirms it."
+OUTPUT = f"File to write [stdout]. {replaces('.md', '.json', '.txt')}"
+WRITTEN = f"File to write. {replaces('.json')}"
 SUBSET = "Allow NEW to lack cases of BASE and to skip cases under another --budget."
 EXPECTED = "File of known failures. [expected.toml beside NEW, if it exists]"
 
@@ -26,7 +29,7 @@ EXPECTED = "File of known failures. [expected.toml beside NEW, if it exists]"
 @click.argument("base", type=PATH)
 @click.argument("new", type=PATH)
 @click.option("--format", type=click.Choice(["table", "md", "json"]), help="[by the suffix of FILE, else table]")
-@click.option("-o", "--output", type=PATH, metavar="FILE", help="File to write [stdout].")
+@click.option("-o", "--output", type=PATH, metavar="FILE", help=OUTPUT)
 @click.option("--factor", type=float, default=1.25, show_default=True, help=FACTOR)
 @click.option("--subset", is_flag=True, help=SUBSET)
 @click.option("--expected", type=PATH, metavar="FILE", help=EXPECTED)
@@ -62,16 +65,17 @@ def compare(
     from gradient_routes.bench.cases import expected as expectations
     from gradient_routes.bench.regression.baseline import measured
     from gradient_routes.bench.regression.compare import compare as compare_sides
-    from gradient_routes.bench.store.output_files import check_writable
+    from gradient_routes.bench.store.output_files import Output
 
     if not 1 < factor < float("inf"):
         raise InputError(f"--factor {factor:g} - give a number > 1")
     known = expectations.beside(new) if expected is None else expectations.read(expected)
     sides = measured(base), measured(new)
-    if output is not None:
-        check_writable("-o", output, [base, new, expected or new.parent / expectations.FILE])
+    file = None if output is None else Output("compare -o", output, (".md", ".json", ".txt"))
+    if file is not None:
+        file.check([base, new, expected or new.parent / expectations.FILE])
     found = compare_sides(*sides, known, factor, subset)
-    _write(found, format or _format_of(output), output)
+    _write(found, format or _format_of(output), file)
     raise click.exceptions.Exit(1 if found.worse else 0)
 
 
@@ -80,24 +84,24 @@ def _format_of(output: Path | None) -> str:
     return suffix if suffix in ("md", "json") else "table"
 
 
-def _write(found: Comparison, format: str, output: Path | None) -> None:
+def _write(found: Comparison, format: str, output: Output | None) -> None:
     """Print the comparison, or write it to the file and print its conclusion."""
     from gradient_routes.bench.regression.text import as_json, markdown
     from gradient_routes.bench.regression.view import conclusion, show_comparison
     from gradient_routes.bench.render.terminal.tables import console
 
-    where = nullcontext(sys.stdout) if output is None else output.open("w", encoding="utf-8")
+    where: AbstractContextManager[Any] = nullcontext(sys.stdout) if output is None else output.text()
     with where as file, redirect_stdout(file):
         if format == "table":
             show_comparison(console(), found)
         else:
             click.echo(markdown(found) if format == "md" else as_json(found), nl=False)
     if output is not None:
-        click.echo(f"{conclusion(found)}; all of it in {output}")
+        click.echo(f"{conclusion(found)}; all of it in {output.path}")
 
 
 @click.command()
-@click.option("-o", "--output", type=PATH, default=BASELINE, show_default=True, help="File to write.")
+@click.option("-o", "--output", type=PATH, default=BASELINE, show_default=True, help=WRITTEN)
 @store_option
 @debug_option
 def baseline(output: Path, store: Path) -> None:
@@ -105,15 +109,17 @@ def baseline(output: Path, store: Path) -> None:
 
     It holds the latest row of every case and every verdict of a store.
     """
-    from gradient_routes.bench.regression.baseline import write
+    from gradient_routes.bench.regression.baseline import MARK, as_text
     from gradient_routes.bench.regression.measured import of_store
-    from gradient_routes.bench.store.output_files import check_writable
+    from gradient_routes.bench.store.output_files import Output
     from gradient_routes.bench.store.store import Store
 
     found = of_store(Store(store))
     output.parent.mkdir(parents=True, exist_ok=True)
-    check_writable("-o", output, [store])
-    write(output, found)
+    target = Output("baseline -o", output, (".json",), MARK)
+    target.check([store])
+    with target.text() as file:
+        file.write(as_text(found))
     counts = {"case": len(found.cases), "verdict": len(found.verdicts)}
     said = " and ".join(f"{n} {what}{'s' if n > 1 else ''}" for what, n in counts.items() if n)
     click.echo(f"{said} of {store} in {output}")

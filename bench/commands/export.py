@@ -6,13 +6,15 @@ from pathlib import Path
 
 import click
 
-from gradient_routes.bench.command_options import debug_option, store_option
+from gradient_routes.bench.command_options import debug_option, replaces, store_option
+
+OUTPUT = f"File to write [stdout]. {replaces('.csv', '.json', '.parquet')}"
 
 
 @click.command()
 @click.option("--table", default="cases", show_default=True, help="A table that results/README.md describes.")
 @click.option("--format", type=click.Choice(["csv", "parquet", "json"]), help="[by the suffix of FILE, else csv]")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write [stdout].")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help=OUTPUT)
 @store_option
 @debug_option
 def export(table: str, format: str | None, output: Path | None, store: Path) -> None:

@@ -15,7 +15,14 @@ from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
-READING = ("compare", "baseline", "status", "report", "export")  # commands that run no code of others: input is wrong
+READING = (
+    "compare",
+    "baseline",
+    "status",
+    "report",
+    "export",
+    "merge",
+)  # commands that run no code of others: input is wrong
 
 
 class Routes(click.Group):
@@ -62,7 +69,7 @@ def code(failure: BaseException, command: str | None) -> int:
     """2 where what was given is wrong, 1 where what was run failed."""
     if isinstance(failure, RoutesError):
         return WRONG_USAGE if isinstance(failure, InputError | DomainError) else FAILED
-    return WRONG_USAGE if isinstance(failure, OSError) or command in READING else FAILED
+    return WRONG_USAGE if command in READING and not isinstance(failure, OSError) else FAILED
 
 
 def leave(code: int) -> NoReturn:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gradient_routes.bench.command_options import debug_option, store_option
+from gradient_routes.bench.command_options import debug_option, replaces, store_option
 
 if TYPE_CHECKING:
     from gradient_routes.bench.store.store import Store
 
-OUTPUT = "File to write; its name says the format: report.html, report.md."
+OUTPUT = f"File to write; its name says the format: report.html, report.md. {replaces('.html', '.md')}"
 FORMAT = "[that of FILE's name, else html]"
-FIGURES = "Folder for every figure as PNG, SVG and PDF; needs gradient-routes[pictures]."
+FIGURES = f"Folder for every figure; needs gradient-routes[pictures]. {replaces('.png', '.svg', '.pdf')}"
 MORE = "routes report -o report.html: figures, curves and all studies, as one page"
 
 

@@ -17,14 +17,13 @@ from gradient_routes.bench.cases.environment import Environment, fingerprint
 from gradient_routes.bench.cases.order import in_order
 from gradient_routes.bench.cases.row import COLUMNS, clean
 from gradient_routes.bench.regression.measured import DECLARED, KEPT, Case, Measured, Verdict, of_store
-from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.store.store import SQLITE, Store
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.tally import KINDS
 
 MARK = "gradient-routes baseline"
 VERSION = 1
 ROUNDS = 50  # ratios kept of a case: more hardly improve a rank test
-MAGIC = b"SQLite format 3\0"
 COLUMN = {column.name: column for column in COLUMNS}
 REQUIRED = ("problem", "route", "at", "status")
 REMEDY = "write it again with `routes baseline`"
@@ -38,8 +37,8 @@ def measured(path: Path) -> Measured:
         raise InputError(f"{path}: no such file - name a store, or a baseline that `routes baseline` wrote")
     try:
         with path.open("rb") as file:
-            start = file.read(len(MAGIC))
-            if start not in (MAGIC, b""):
+            start = file.read(len(SQLITE))
+            if start not in (SQLITE, b""):
                 return read(path, start + file.read())
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error} - name a file you may read") from error
@@ -85,16 +84,6 @@ def _compact(case: Case) -> Row:
 
 def _digits(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")
-
-
-def write(path: Path, found: Measured) -> None:
-    """Write a baseline. Raises InputError rather than overwrite a file that is not one."""
-    try:
-        if path.exists() and path.stat().st_size and MARK not in path.read_text(errors="replace")[:100]:
-            raise InputError(f"{path}: is there and no baseline - name another file with -o")
-        path.write_text(as_text(found), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error} - name a file you may write with -o") from error
 
 
 def read(path: Path, content: bytes) -> Measured:

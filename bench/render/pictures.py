@@ -8,6 +8,8 @@ from pathlib import Path
 
 from gradient_routes.bench.render.figure import Section
 from gradient_routes.bench.render.vega import svg
+from gradient_routes.bench.store.output_files import Output
+from gradient_routes.bench.store.replacing import check_folder
 from gradient_routes.problems.errors import InputError
 
 FORMATS = ("png", "svg", "pdf")
@@ -20,14 +22,13 @@ def check(folder: Path) -> None:
         raise InputError("--figures: needs vl-convert - pip install 'gradient-routes[pictures]'")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / ".routes").touch()
-        (folder / ".routes").unlink()
+        check_folder(folder)
     except OSError as error:
         raise InputError(f"--figures {folder}: {error.strerror} - name a folder you may write") from error
 
 
-def write(sections: Sequence[Section], folder: Path) -> list[str]:
-    """Every figure in every format; the names of what was drawn. Raises InputError."""
+def write(sections: Sequence[Section], folder: Path, store: Path) -> list[str]:
+    """Every figure in every format; the names of what was drawn. Raises RoutesError."""
     import vl_convert
 
     drawn = []
@@ -39,10 +40,9 @@ def write(sections: Sequence[Section], folder: Path) -> list[str]:
             "pdf": vl_convert.svg_to_pdf(picture),
         }
         for format in FORMATS:
-            path = folder / f"{figure.id}.{format}"
-            try:
-                path.write_bytes(made[format])
-            except OSError as error:
-                raise InputError(f"--figures {path}: {error.strerror} - name a folder you may write") from error
+            output = Output("--figures", folder / f"{figure.id}.{format}", (f".{format}",))
+            output.check([store])
+            with output.open() as file:
+                file.write(made[format])
         drawn.append(figure.id)
     return drawn

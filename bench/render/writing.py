@@ -5,36 +5,35 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import click
-
 from gradient_routes.bench.render import html, markdown, pictures
 from gradient_routes.bench.render.figure import Section
 from gradient_routes.bench.render.sections import sections
 from gradient_routes.bench.render.source import Source, read
+from gradient_routes.bench.store.output_files import Output, print_bytes
 from gradient_routes.bench.store.store import Store
-from gradient_routes.problems.errors import InputError
 
 STDOUT = Path("-")
+SUFFIXES = (".html", ".htm", ".md", ".markdown")
 
 
 def report(store: Store, output: Path | None, format: str | None, folder: Path | None) -> list[str]:
     """Write what is asked for: a page or Markdown to `output` (stdout where none), figures to `folder`.
 
-    Sentences for what was written. Raises InputError.
+    Sentences for what was written. Raises RoutesError.
     """
-    if output not in (None, STDOUT):
-        assert output is not None
-        _check(store, output)
+    file = None if output in (None, STDOUT) or output is None else Output("report -o", output, SUFFIXES)
+    if file is not None:
+        file.check([store.path])
     if folder is not None:
         pictures.check(folder)
     source = read(store)
     made = sections(source)
-    drawn = [] if folder is None else pictures.write(made, folder)
+    drawn = [] if folder is None else pictures.write(made, folder, store.path)
     said = [] if folder is None else [f"{len(drawn)} figures as {', '.join(pictures.FORMATS)} in {folder}"]
     if format is not None:
         text = _text(source, made, format, output, folder, drawn)
-        _write(output or STDOUT, text)
-        said += [] if output in (None, STDOUT) else [f"report of {len(source.cases)} cases in {output}"]
+        _write(file, text.encode("utf-8", "backslashreplace"))
+        said += [] if file is None else [f"report of {len(source.cases)} cases in {output}"]
     return said
 
 
@@ -48,25 +47,9 @@ def _text(
     return markdown.text(source, made, where, drawn)
 
 
-def _check(store: Store, output: Path) -> None:
-    if output.is_dir():
-        raise InputError(f"report -o {output}: is a directory - name a file in it: {output}/report.html")
-    if output.exists() and store.path.exists() and output.samefile(store.path):
-        raise InputError(f"report -o {output}: is the store itself - name another file")
-    new = not output.exists()
-    try:
-        output.open("ab").close()
-    except OSError as error:
-        raise InputError(f"report -o {output}: {error.strerror} - name a file you may write") from error
-    if new:
-        output.unlink()
-
-
-def _write(output: Path, text: str) -> None:
-    try:
-        with click.open_file(str(output), "wb") as file:
-            file.write(text.encode("utf-8", "backslashreplace"))
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise InputError(f"report -o {output}: {error.strerror} - name a file you may write") from error
+def _write(file: Output | None, content: bytes) -> None:
+    if file is None:
+        print_bytes(content)
+        return
+    with file.open() as target:
+        target.write(content)

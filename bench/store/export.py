@@ -9,13 +9,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import click
-
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.bench.store.frames import frame
+from gradient_routes.bench.store.output_files import Output, print_bytes
 from gradient_routes.bench.store.schema import tables
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
+
+SUFFIXES = (".csv", ".json", ".parquet")
 
 
 def export(store: Store, table: str, format: str, output: Path | None) -> None:
@@ -25,8 +26,9 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
     names, records = store.table(table)
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
-    if output is not None and output.resolve() == store.path.resolve():
-        raise InputError(f"export: {output} is the store itself - name another file with -o")
+    file = None if output is None else Output("export -o", output, SUFFIXES)
+    if file is not None:
+        file.check([store.path])
     if format == "json":
         rows = [dict(zip(names, record, strict=True)) for record in records]
         content = (json.dumps(rows, allow_nan=False) + "\n").encode()
@@ -36,14 +38,11 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
         text = io.StringIO(newline="")
         csv.writer(text, lineterminator="\n").writerows([names, *records])
         content = text.getvalue().encode()
-    try:
-        with click.open_file(str(output or "-"), "wb") as file:
-            file.write(content)
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        where = output or "stdout"
-        raise InputError(f"export: {where}: {error.strerror} - name a file you may write with -o") from error
+    if file is None:
+        print_bytes(content)
+        return
+    with file.open() as target:
+        target.write(content)
 
 
 def _parquet(table: str, names: list[str], records: list[tuple[Any, ...]]) -> bytes:

@@ -1,21 +1,151 @@
-"""Files written beside a store."""
+"""Files that options name: one rule for all of them.
+
+An earlier file of the same kind is replaced, whole and only once the new one is complete. No other file is: not a
+source, not a store or what belongs to it, not what the command reads, nor what is linked to one of these.
+"""
 
 from __future__ import annotations
 
+import codecs
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from gradient_routes.bench.cases.folder import located
-from gradient_routes.problems.errors import InputError
+from gradient_routes.bench.sanitize import unread
+from gradient_routes.bench.store.replacing import check_folder, replacing
+from gradient_routes.bench.store.store import BESIDE, SQLITE
+from gradient_routes.problems.errors import InputError, RoutesError
+
+TODO = "name a file you may write"
+PARTS = re.compile(r"[\[\],=|]")  # of a selector
 
 
-def check_writable(option: str, path: Path, taken: list[Path]) -> None:
-    file = located(path)
-    if any(file.resolve() == located(other).resolve() for other in taken):
-        raise InputError(f"{option} {path}: is another file of this run - name one of its own")
-    new = not file.exists()
+@dataclass(frozen=True)
+class Output:
+    """A file that `option` names; `suffixes` are those of its kind, which begins with a `mark` if it has one."""
+
+    option: str
+    path: Path
+    suffixes: tuple[str, ...]
+    mark: str = ""
+
+    def check(self, taken: Iterable[Path]) -> None:
+        """Raise InputError, before anything is measured, for a file that may not or cannot be replaced.
+
+        `taken` are stores, other outputs and all that the command reads: see `read_by`.
+        """
+        with self._errors(InputError):
+            target = self._target()
+            if target.is_dir():
+                raise InputError(f"{self}: Is a directory - name a file in it")
+            if any(_same(target, near) for other in taken for near in _near(located(other).resolve())):
+                raise InputError(f"{self}: is another file of this run - name one of its own")
+            if target.exists() and not os.access(target, os.W_OK):
+                raise PermissionError(13, os.strerror(13))
+            if _stream(target) is not None or (target.exists() and not target.is_file()):
+                return  # a pipe or a device
+            self._check_kind(target)
+            check_folder(target.parent)
+
+    @contextmanager
+    def open(self) -> Iterator[BinaryIO]:
+        """The file to write. Raises RoutesError; then what was there is still there."""
+        with self._errors(RoutesError):
+            target = self._target()
+            stream = _stream(target)
+            if stream is not None:  # opened anew it would overwrite what is printed
+                sys.stdout.flush()
+                with open(os.dup(stream), "wb") as file:
+                    yield file
+            elif target.exists() and not target.is_file():
+                with target.open("wb") as file:
+                    yield file
+            else:
+                with replacing(target) as file:
+                    yield file
+
+    @contextmanager
+    def text(self) -> Iterator[codecs.StreamWriter]:
+        """The same for text in UTF-8."""
+        with self.open() as file:
+            yield codecs.getwriter("utf-8")(file, "backslashreplace")
+
+    def __str__(self) -> str:
+        return f"{self.option} {self.path}"
+
+    def _target(self) -> Path:
+        """What the name stands for, through symbolic links."""
+        try:
+            return located(self.path).resolve()
+        except RuntimeError as error:  # links in a circle
+            raise InputError(f"{self}: {error} - {TODO}") from error
+
+    def _check_kind(self, target: Path) -> None:
+        if not target.exists() or not target.stat().st_size:
+            return
+        with target.open("rb") as file:
+            head = file.read(100)
+        if head.startswith(SQLITE):
+            raise InputError(f"{self}: is a store or another database - name another file")
+        if target.suffix.lower() not in self.suffixes or self.mark.encode() not in head:
+            kind = self.mark or " or ".join(self.suffixes)
+            raise InputError(f"{self}: is there and no {kind} - delete it first, or name another file")
+
+    @contextmanager
+    def _errors(self, kind: type[RoutesError]) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise kind(f"{self}: {error.strerror or error} - {TODO}") from error
+
+
+def read_by(*named: Path | str | None) -> list[Path]:
+    """The files that paths, selectors and references `FILE.py:NAME` name, and what those import from beside them."""
+    from gradient_routes.bench.cases.sources import closure
+
+    texts = [str(text) for text in named if text is not None]
+    words = [word for text in texts for part in (text, *PARTS.split(text)) for word in (part, part.rpartition(":")[0])]
+    files = {located(word.strip()).absolute() for word in words if os.path.isfile(located(word.strip()))}
+    sources = [file for file in files if file.suffix == ".py"]
+    return sorted(files.union(*(closure(file, file.parent, None) for file in sources)))
+
+
+def print_bytes(content: bytes) -> None:
+    """To stdout. Raises BrokenPipeError where its reader has gone, RoutesError for another failure."""
     try:
-        file.open("ab").close()
+        sys.stdout.buffer.write(content)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
     except OSError as error:
-        raise InputError(f"{option} {path}: {error.strerror or error} - name a file you may write") from error
-    if new:
-        file.unlink()
+        unread(sys.stdout)
+        raise RoutesError(f"stdout: {error.strerror or error} - check where the output goes") from error
+
+
+def _near(path: Path) -> list[Path]:
+    """A file and, if it is a store, those that belong to it."""
+    return [path, *(path.with_name(path.name + end) for end in BESIDE)]
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two names stand for one file, hard links included."""
+    return one == other or (one.exists() and other.exists() and one.samefile(other))
+
+
+def _stream(target: Path) -> int | None:
+    """The descriptor of stdout or stderr, if that is where `target` leads: /dev/stdout of a redirected process."""
+    if not target.exists():
+        return None
+    for number in (1, 2):
+        try:
+            if os.path.samestat(target.stat(), os.fstat(number)):
+                return number
+        except OSError:  # closed
+            continue
+    return None

@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 APPLICATION = 0x67726164  # "grad": SQLite's mark of whose file this is
 SCHEMA = 5  # 2: partial; 3: tables of studies; 4: processes, limits, keys; 5: scaling, inversion, identifiability
+SQLITE = b"SQLite format 3\0"  # a database begins with it
+CLAIMS = "-claims"
+BESIDE = ("-journal", "-wal", "-shm", CLAIMS)  # files that belong to a store
+ROOM = 2**16  # [byte] to be free beside it: for a journal and some rows
 PATIENCE = 60.0  # [s] to wait for another writer
 
 
@@ -54,24 +58,30 @@ class Store:
     def claims(self) -> Path:
         """The file of locks on its cases, beside it."""
         path = self.file.resolve()
-        return path.with_name(f"{path.name}-claims")
+        return path.with_name(path.name + CLAIMS)
 
     def check_writable(self) -> None:
-        """Raise InputError now rather than after the first case. What is not there yet is not made."""
-        with self._errors():
-            self._refuse_folder()
-            try:
-                os.stat(self.file)
-            except FileNotFoundError:
-                there = next(folder for folder in self.file.parents if folder.exists())
-                tempfile.TemporaryFile(dir=there).close()
-                return
-        with self._transaction():
-            pass
+        """Write to it and to its folder. Raises InputError now rather than after the first case.
 
-    def _refuse_folder(self) -> None:
+        What is not there yet is not made.
+        """
+        with self._errors():
+            self._refuse_others()
+            there = next(folder for folder in self.file.resolve().parents if folder.exists())
+            with tempfile.TemporaryFile(dir=there) as file:
+                file.write(bytes(ROOM))
+                file.flush()
+                os.fsync(file.fileno())
+            if not self.file.exists():
+                return
+        with self.transaction() as db:
+            db.execute(f"PRAGMA user_version = {SCHEMA}")  # writes a page, whatever was there
+
+    def _refuse_others(self) -> None:
         if self.file.is_dir():
             raise InputError(f"store {self.path}: is a directory - name a file in it: {self.path}/routes.sqlite")
+        if self.file.exists() and not self.file.is_file():
+            raise InputError(f"store {self.path}: is no file of a disk - name one with --store")
 
     def append(self, row: Row, samples: Samples | None, measured_in: Environment | None = None) -> None:
         """Keep a row and its raw timings, all or nothing, and the environment of its process, this one's if None."""
@@ -81,7 +91,7 @@ class Store:
         """Many at once, all or nothing: the disk is waited for once, which is what a row costs."""
         names = ", ".join(["environment_id", *(c.name for c in STORED)])
         marks = ", ".join("?" * (1 + len(STORED)))
-        with self._transaction() as db:
+        with self.transaction() as db:
             for row, samples, measured_in in cases:
                 values = (self._environment_id(db, measured_in), *as_record(row))
                 case_id = db.execute(f"INSERT INTO cases ({names}) VALUES ({marks})", values).lastrowid
@@ -100,7 +110,7 @@ class Store:
         stderr: str | None = None,
     ) -> int:
         """Keep the rows of one study, by table, and how it ended, all or nothing. Returns its study_id."""
-        with self._transaction() as db:
+        with self.transaction() as db:
             values = (study, self._environment_id(db), started, status, reason, stderr)
             names = "study, environment_id, started, status, reason, stderr"
             cursor = db.execute(f"INSERT INTO studies ({names}) VALUES (?, ?, ?, ?, ?, ?)", values)
@@ -143,6 +153,11 @@ class Store:
                         f"store {self.path}: {where}: no JSON ({error}) - delete that row, or name another store"
                     ) from error
         return row
+
+    def names(self) -> set[str]:
+        """Of its tables. Raises InputError where there is no store."""
+        with self._reading() as db:
+            return {name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
 
     def cases(self) -> DataFrame:
         """All cases of `routes run`, oldest first: one row each. An absent value is NA, objects are JSON text.
@@ -206,9 +221,10 @@ class Store:
                 yield db
 
     @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """The database to write to, all or nothing. Raises InputError."""
         with self._errors():
-            self._refuse_folder()
+            self._refuse_others()
             self.file.parent.mkdir(parents=True, exist_ok=True)
             with closing(sqlite3.connect(self._uri("rwc"), uri=True, timeout=PATIENCE, isolation_level=None)) as db:
                 db.execute("BEGIN IMMEDIATE")

@@ -14,12 +14,13 @@ from gradient_routes.bench.cases.study import Kept, Note, Study
 from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.sanitize import plain, unread
+from gradient_routes.bench.store.keeping import apart
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.job import ExitCode, Printed
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
 
-LOST = 2  # exit code where what was found could not be written
+LOST = 1  # exit code where what was found could not be written
 
 
 class Session:
@@ -57,11 +58,10 @@ class Session:
         end, rows = self.end, any(self.tables.values())
         well = end.status is Status.OK
         if self.store is not None and (rows or end.status.todo):  # `todo`: it was ended, or lost
-            how = () if well else (end.status, end.reason, end.stderr)
             try:
-                self.store.append_study(self.study.name, self.tables, self.started, *how)
+                self._append(self.store)
             except InputError as error:
-                self.lost = f"not kept: {error}"
+                self.lost = apart(self.store, self._append, f"not kept: {error}")
             else:
                 if rows and not self.as_json:
                     self._print(click.style(plain(f"kept in {self.store.path}"), dim=True) + "\n")
@@ -75,6 +75,11 @@ class Session:
         if self.lost:
             complain(self.lost)
         return (LOST if self.lost else self.code) if well else end.status.exit_code
+
+    def _append(self, store: Store) -> None:
+        end = self.end
+        how = (Status.OK, None, None) if end.status is Status.OK else (end.status, end.reason, end.stderr)
+        store.append_study(self.study.name, self.tables, self.started, *how)
 
     def _print(self, text: str) -> None:
         """A reader who has gone ends nothing; nor does a full disk, which is said in the end."""

@@ -19,6 +19,7 @@ from gradient_routes.bench.command_options import (
     debug_option,
     debugging,
     refuse_given,
+    replaces,
     solver_options,
     store_options,
 )
@@ -36,11 +37,13 @@ if TYPE_CHECKING:
 
 Only = Literal["missing", "failed", "stale", "all"]
 SHOWN = "-"  # --gradient without a file
-GRADIENT = "Show every component of the gradient beside its reference; with FILE.csv, write them there instead."
+GRADIENT = (
+    f"Show every component of the gradient beside its reference; with FILE.csv, write them there. {replaces('.csv')}"
+)
 COMPONENTS = "Compute only M components of dJ/dp, drawn at random."
 DIRECTIONS = "Compute only the slopes of J along M random directions."
-VTU = "Write u, lambda and dJ/dp on the mesh, for ParaView. For one problem and one route."
-SENSITIVITIES = "Write du/dp to FILE.csv, FILE.npz or FILE.vtu. For one problem and --route tangent."
+VTU = f"Write u, lambda and dJ/dp on the mesh, for ParaView. For one problem and one route. {replaces('.vtu')}"
+SENSITIVITIES = f"Write du/dp, for one problem and --route tangent. {replaces('.csv', '.npz', '.vtu')}"
 OF = "Sensitivities of the state, du/dp, or of the data, d(S u)/dp."
 COLUMNS = "Parameters to write du/dp for, by number, as 1,5-8; also written to --vtu. [all; in --vtu none]"
 BUDGET = "Skip gradients predicted to take longer [s] or to need more memory than there is; inf: skip none."
@@ -109,6 +112,7 @@ def run(
     interrupted.
     """
     from gradient_routes.bench.cases import case
+    from gradient_routes.bench.cases.expected import FILE
     from gradient_routes.bench.cases.partial import chosen
     from gradient_routes.bench.cases.settings import Settings
     from gradient_routes.bench.execution.describing import described
@@ -116,6 +120,7 @@ def run(
     from gradient_routes.bench.execution.sweep import everything
     from gradient_routes.bench.execution.sweep import run as run_cases
     from gradient_routes.bench.store.claims import Claims
+    from gradient_routes.bench.store.output_files import read_by
     from gradient_routes.bench.store.store import Store
     from gradient_routes.bench.studies.bill.done import Done
     from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
@@ -129,8 +134,8 @@ def run(
     problem_specs, route_specs = case.problems(problems, told), case.routes(routes, told)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu, sensitivities)
     count = len(problem_specs) * len(route_specs)
-    inputs = case.files([spec.options for spec in problem_specs], at)
-    files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *inputs])
+    read = read_by(*problems, *routes, at, expected, kept and kept.parent / FILE)
+    files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *read])
     if sensitivities is None:
         refuse_given(("sensitivities_of",), "is of --sensitivities")
         if vtu is None or route_specs[0].name != COLUMNS_OF:
@@ -158,16 +163,17 @@ def run(
     except KeyboardInterrupt:
         raise KeyboardInterrupt("" if store is None else f"; go on with: {_resumed()}") from None
     finally:  # after an interrupt, too
-        done.show(gradients=gradient == SHOWN)
+        done.close(gradients=gradient == SHOWN)
         said, failed = files.write(done.ordered)
         for line in said:
             click.echo(line, err=as_json)
+        failed += done.failed
+        if failed:
+            complain("; ".join(failed))
     if resume or only:
         complain(f"{len(done.outcomes)} of {count} cases run, the others left as they are")
-    if done.lost:
-        failed.append(f"{len(done.lost)} of {len(done.outcomes)} rows were not kept: {done.lost[0]}")
     if failed:
-        raise InputError("; ".join(failed))
+        raise click.exceptions.Exit(1)
     if debugging():
         click.echo("".join(outcome.row["traceback"] or "" for outcome in done.outcomes), err=True, nl=False)
     if done.failures:

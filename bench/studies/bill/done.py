@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
-from gradient_routes.problems.errors import InputError
+from gradient_routes.bench.sanitize import unread
+from gradient_routes.bench.store.keeping import Keeper
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
@@ -18,22 +21,19 @@ if TYPE_CHECKING:
 
 
 class Done:
-    """Outcomes so far, without what only the store needs; `lost` says which rows could not be stored, and why."""
+    """Outcomes so far, without what only the store needs; `failed` says what could not be stored or printed."""
 
     def __init__(self, store: Store | None, as_json: bool, known: Sequence[Expectation], views: bool) -> None:
         self.store, self.as_json, self.known, self._views = store, as_json, known, views
         self.outcomes: list[Outcome] = []
-        self.lost: list[str] = []
+        self.failed: list[str] = []
+        self._keeper = Keeper(store)
         self._waiting: dict[int, Row] = {}  # by place: rows that are not printed yet
         self._next = 0
 
     def take(self, outcome: Outcome) -> None:
         """Store a row at once; print it, as JSON, as soon as all rows before it are printed."""
-        try:
-            if self.store is not None:
-                self.store.append(outcome.row, outcome.samples, outcome.environment)
-        except InputError as error:  # a full disk or a lock: the row is still printed
-            self.lost.append(str(error))
+        self._keeper.append(outcome.row, outcome.samples, outcome.environment)
         self._waiting[outcome.place] = outcome.row
         while self._next in self._waiting:
             self._print(self._next)
@@ -46,19 +46,36 @@ class Done:
 
         row = self._waiting.pop(place)
         if self.as_json:
-            click.echo(as_json(row))
+            with self._printing():
+                click.echo(as_json(row))
 
-    def show(self, gradients: bool) -> None:
-        """Print the table and, if asked for, gradients; with --json the rows that still wait for an earlier one."""
+    def close(self, gradients: bool) -> None:
+        """Keep what could not be stored before. Print the table and, if asked for, gradients; with --json the rows that
+        still wait for an earlier one.
+        """
         from gradient_routes.bench.studies.bill.view import show
 
+        apart = self._keeper.close()
+        self.failed += [apart] if apart else []
         for place in sorted(self._waiting):
             self._print(place)
         if self.as_json:
             return
         views = [(o.row, o.view) for o in self.ordered if o.view is not None and gradients]
-        kept = None if self.store is None or self.lost else self.store.path
-        show([o.row for o in self.ordered], views, kept, self.known)
+        kept = None if self.store is None or apart else self.store.path
+        with self._printing():
+            show([o.row for o in self.ordered], views, kept, self.known)
+
+    @contextmanager
+    def _printing(self) -> Iterator[None]:
+        """What cannot be printed is kept all the same; a reader who has gone ends the run."""
+        try:
+            yield
+        except OSError as error:
+            unread(sys.stdout)
+            if isinstance(error, BrokenPipeError):
+                raise
+            self.failed.append(f"stdout: {error.strerror} - check where the output goes")
 
     @property
     def ordered(self) -> list[Outcome]:

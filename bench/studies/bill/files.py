@@ -9,9 +9,10 @@ from pathlib import Path
 from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.partial import Partial
-from gradient_routes.bench.store.output_files import check_writable
-from gradient_routes.problems.errors import InputError
+from gradient_routes.bench.store.output_files import Output
+from gradient_routes.problems.errors import InputError, RoutesError
 
+SUFFIXES = (".csv", ".npz", ".vtu")  # of sensitivities
 COLUMNS_OF = "tangent"  # the route whose linearized states the columns are
 
 
@@ -44,64 +45,60 @@ class Files:
             raise InputError(
                 f"--sensitivities {self.sensitivities}: {routes[0].name} has no du/dp - give --route {COLUMNS_OF}"
             )
-        for option, path, _ in self._all:
-            if path is not None:
-                check_writable(option, path, taken)
-                taken.append(path)
+        for output, _ in self._all:
+            output.check(taken)
+            taken.append(output.path)
 
     @property
-    def _all(self) -> tuple[tuple[str, Path | None, Callable[[Path, Sequence[Outcome]], str]], ...]:
-        return (
-            ("--gradient", self.gradient, _gradients),
-            ("--vtu", self.vtu, _fields),
-            ("--sensitivities", self.sensitivities, _sensitivities),
+    def _all(self) -> list[tuple[Output, Callable[[Output, Sequence[Outcome]], str]]]:
+        every = (
+            ("--gradient", self.gradient, (".csv",), _gradients),
+            ("--vtu", self.vtu, (".vtu",), _fields),
+            ("--sensitivities", self.sensitivities, SUFFIXES, _sensitivities),
         )
+        return [(Output(option, path, kind), write) for option, path, kind, write in every if path is not None]
 
     def write(self, outcomes: Sequence[Outcome]) -> tuple[list[str], list[str]]:
         """Write what was measured. Sentences for what was written or why it was not, and for what went wrong."""
         said: list[str] = []
         failed: list[str] = []
-        for option, path, write in self._all:
-            if path is None or not outcomes:
-                continue
+        for output, write in self._all if outcomes else ():
             try:
-                said.append(write(path, outcomes))
-            except InputError as error:
+                said.append(write(output, outcomes))
+            except RoutesError as error:
                 failed.append(str(error))
-            except OSError as error:
-                failed.append(f"{option} {path}: {error.strerror or error} - name a file you may write")
         return said, failed
 
 
-def _gradients(path: Path, outcomes: Sequence[Outcome]) -> str:
+def _gradients(output: Output, outcomes: Sequence[Outcome]) -> str:
     from gradient_routes.bench.studies.bill import gradient_csv
 
     views = [(o.row, o.view) for o in outcomes if o.view is not None]
-    gradient_csv.write(path, views)
-    return f"gradients of {len(views)} of {len(outcomes)} cases in {path}"
+    gradient_csv.write(output, views)
+    return f"gradients of {len(views)} of {len(outcomes)} cases in {output.path}"
 
 
-def _fields(path: Path, outcomes: Sequence[Outcome]) -> str:
+def _fields(output: Output, outcomes: Sequence[Outcome]) -> str:
     from gradient_routes.bench.studies.bill import vtu
 
     (outcome,) = outcomes
     if outcome.fields is None:
-        return _nothing(path, outcome, "fields")
-    vtu.write(path, outcome.fields)
-    return f"fields in {path}"
+        return _nothing(output.path, outcome, "fields")
+    vtu.write(output, outcome.fields)
+    return f"fields in {output.path}"
 
 
-def _sensitivities(path: Path, outcomes: Sequence[Outcome]) -> str:
+def _sensitivities(output: Output, outcomes: Sequence[Outcome]) -> str:
     from gradient_routes.bench.studies.bill import sensitivity_files
 
-    if path.suffix == ".vtu":
-        return _fields(path, outcomes)
+    if output.path.suffix == ".vtu":
+        return _fields(output, outcomes)
     (outcome,) = outcomes
     if outcome.sensitivities is None:
-        return _nothing(path, outcome, "sensitivities")
-    sensitivity_files.write(path, outcome.sensitivities)
+        return _nothing(output.path, outcome, "sensitivities")
+    sensitivity_files.write(output, outcome.sensitivities)
     rows, columns = outcome.sensitivities.values.shape
-    return f"sensitivities, {rows} rows and {columns} columns, in {path}"
+    return f"sensitivities, {rows} rows and {columns} columns, in {output.path}"
 
 
 def _nothing(path: Path, outcome: Outcome, what: str) -> str:

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.outcome import View
 from gradient_routes.bench.render.terminal.tables import named
+from gradient_routes.bench.store.output_files import Output
 
 AXES = ("x", "y", "z")
 
 
-def write(path: Path, views: Sequence[tuple[Row, View]]) -> None:
+def write(output: Output, views: Sequence[tuple[Row, View]]) -> None:
     """Write a line per parameter: problem, route, parameter, unit, its position (x, y, z as far as known), p, dJ_dp,
-    reference. Raises OSError.
+    reference. Raises RoutesError.
     """
     d = max((v.position.shape[1] for _, v in views if v.position is not None), default=0)
-    with located(path).open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
+    with output.text() as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["problem", "route", "parameter", "unit", *AXES[:d], "p", "dJ_dp", "reference"])
         for row, view in views:

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.outcome import Sensitivities
 from gradient_routes.bench.cases.settings import Columns
+from gradient_routes.bench.store.output_files import Output
+from gradient_routes.bench.studies.bill.files import SUFFIXES
 from gradient_routes.problems.errors import InputError
-
-SUFFIXES = (".csv", ".npz", ".vtu")
 
 
 def wanted(path: Path | None, of: str, columns: str | None, vtu: bool) -> Columns | None:
@@ -41,14 +40,14 @@ def numbers(text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def write(path: Path, columns: Sensitivities) -> None:
-    """As CSV, a row an unknown or a datum, or as NPZ. Raises OSError."""
-    if path.suffix == ".npz":
-        with located(path).open("wb") as file:
+def write(output: Output, columns: Sensitivities) -> None:
+    """As CSV, a row an unknown or a datum, or as NPZ. Raises RoutesError."""
+    if output.path.suffix == ".npz":
+        with output.open() as file:
             names = {"rows": columns.rows, "parameters": columns.parameters, "units": columns.units}
             np.savez(file, allow_pickle=False, **{columns.name: columns.values}, **names)
         return
-    with located(path).open("w", newline="", encoding="utf-8", errors="backslashreplace") as text:
+    with output.text() as text:
         out = csv.writer(text, lineterminator="\n")
         out.writerow([columns.name, *columns.parameters])
         out.writerows([name, *row] for name, row in zip(columns.rows, columns.values.tolist(), strict=True))

@@ -8,13 +8,12 @@ import click
 
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Options, Rule, Study
-from gradient_routes.bench.command_options import at_option, solver_options
+from gradient_routes.bench.command_options import at_option, replaces, solver_options
 from gradient_routes.bench.verification.columns import CHECKS, POINTS
 
 ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
-HTML = click.option(
-    "--html", type=click.Path(path_type=Path), metavar="FILE", help="Write the verdict and its curves there."
-)
+PAGE = f"Write the verdict and its curves there. {replaces('.html')}"
+HTML = click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help=PAGE)
 QUESTION = ("problem", "route", "at")
 TABLES = {"checks": Table(CHECKS, QUESTION), "points": Table(POINTS, QUESTION)}
 

@@ -6,20 +6,19 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
-from gradient_routes.bench.store.output_files import check_writable
+from gradient_routes.bench.store.output_files import Output, read_by
 from gradient_routes.bench.verification.page import page
 from gradient_routes.bench.verification.result import Check, rows
+from gradient_routes.problems.errors import RoutesError
 
-LOST = 2  # exit code where the page asked for could not be written
+LOST = 1  # exit code where the page asked for could not be written
 
 
-def page_writable(html: Path | None, taken: Iterable[Path | str | None]) -> None:
+def page_writable(html: Path | None, kept: Path | None, read: Iterable[Path | str | None]) -> None:
     """Raise InputError now rather than after all is measured, and for a page that would replace what is read."""
     if html is not None:
-        files = [Path(str(name).partition(":")[0].partition("[")[0]) for name in taken if name is not None]
-        check_writable("--html", html, files)
+        _output(html).check([*([] if kept is None else [kept]), *read_by(*read)])
 
 
 def conclude(say: Say, check: Check, what: Row, html: Path | None) -> int:
@@ -37,7 +36,12 @@ def conclude(say: Say, check: Check, what: Row, html: Path | None) -> int:
 def _written(check: Check, html: Path) -> Note:
     """What to say of the page: a result, or why it is lost."""
     try:
-        located(html).write_text(page(check), encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        return Note(f"--html {html}: {error.strerror or error} - name a file you may write")
+        with _output(html).text() as file:
+            file.write(page(check))
+    except RoutesError as error:
+        return Note(str(error))
     return Note(f"page in {html}", result=True)
+
+
+def _output(html: Path) -> Output:
+    return Output("--html", html, (".html", ".htm"))

@@ -48,7 +48,7 @@ def run(
     plan = Plan(budget=budget, seed=seed)
     accepted(accept)
     asked = _subject(target, objective, gradient, problem, route, at, solver)
-    page_writable(html, [kept, target, objective, gradient, problem, route, at])
+    page_writable(html, kept, [target, objective, gradient, problem, route, at])
     with stdout_to_stderr():
         found = check(asked, plan, accept)
     named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}

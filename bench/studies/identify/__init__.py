@@ -8,7 +8,7 @@ import click
 
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Rule, Study
-from gradient_routes.bench.command_options import at_option, solver_options
+from gradient_routes.bench.command_options import at_option, replaces, solver_options
 from gradient_routes.bench.studies.identify.columns import EXPERIMENTS, IDENTIFIED, PLACEMENT, SPECTRUM
 from gradient_routes.bench.studies.options import problem_option
 
@@ -19,7 +19,7 @@ VARY = "Another value of any other option; repeatable."
 PLACE = "Propose K further sensors."
 CRITERION = "Least volume (D) or mean variance (A) of the posterior covariance."
 AFRESH = "Place them instead of the present sensors, not beside them."
-VTU = "Null share, column norm and standard deviation cell by cell, for ParaView."
+VTU = f"Null share, column norm and standard deviation cell by cell, for ParaView. {replaces('.vtu')}"
 QUESTION = ("experiment", "at")
 
 STUDY = Study(

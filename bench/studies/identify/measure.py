@@ -8,14 +8,14 @@ from pathlib import Path
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
-from gradient_routes.bench.store.output_files import check_writable
+from gradient_routes.bench.store.output_files import Output, read_by
 from gradient_routes.bench.studies.bill import vtu as file
 from gradient_routes.bench.studies.identify.identifiability import Identified, identify, varied
 from gradient_routes.bench.studies.identify.placement import Criterion, Placement
 from gradient_routes.bench.studies.identify.placement import place as placed
 from gradient_routes.bench.studies.identify.rows import fields, rows
 from gradient_routes.bench.studies.options import one_problem
-from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.routes.newton import Solver
 
 
@@ -45,26 +45,31 @@ def run(
     vtu: Path | None,
     solver: Solver,
     kept: Path | None,
-) -> None:
+) -> int:
     given = {"sensors": sensors, "cases": cases, "stop": stop}
     changes = [(name, text) for name, texts in given.items() for text in texts]
     specs = varied(one_problem(selector), [*changes, *map(_change, vary)])
-    if vtu is not None:
-        check_writable("--vtu", vtu, [] if kept is None else [kept])
+    output = None if vtu is None else Output("--vtu", vtu, (".vtu",))
+    if output is not None:
+        output.check([*([] if kept is None else [kept]), *read_by(selector, at, *vary)])
     found = [identify(spec, at, noise, solver, modes) for spec in specs]
     placement = None if place is None else placed(found[0], place, criterion, afresh)
-    mesh = None if vtu is None else fields(found[0])
+    mesh = None if output is None else fields(found[0])
     tables = rows(found, placement)
     for name, of in tables.items():
         for row in of:
             say(Kept(name, row))
     say(Found(Determined(found, placement, tables)))
-    if vtu is not None and mesh is not None:
+    if output is not None and mesh is not None:
         try:
-            file.write(vtu, mesh)
-        except OSError as error:
-            raise InputError(f"--vtu {vtu}: {error.strerror or error} - name a file you may write") from error
+            file.write(output, mesh)
+        except InputError:
+            raise
+        except RoutesError as error:
+            say(Note(str(error)))
+            return 1
         say(Note(f"fields in {vtu}", result=True))
+    return 0
 
 
 def _change(text: str) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from gradient_routes.bench.cases.case import ProblemSpec
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.bench.cases.study import Found, Kept, Say
+from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.command_options import checked, debugging, refuse_given
 from gradient_routes.bench.execution.describing import described
 from gradient_routes.bench.execution.executors.isolated import called
@@ -23,6 +23,7 @@ from gradient_routes.bench.execution.sweep import How
 from gradient_routes.bench.execution.sweep import run as run_cases
 from gradient_routes.bench.render.terminal.tables import titled
 from gradient_routes.bench.sanitize import plain
+from gradient_routes.bench.store.keeping import Keeper
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.options import routes_of
 from gradient_routes.bench.studies.scaling.break_even import BreakEvens, Racing, break_even
@@ -57,10 +58,10 @@ def run(
     asked = sizes_of(case.problems([selector], told), first, growth, levels, count)
     specs = routes_of(routes, say, told)
     settings = Settings(at, checked(budget), min_time, solver=solver)
-    lost: list[str] = []
+    keeper = Keeper(None if kept is None else Store(kept))
     measure = partial(run_cases, how=How(isolate, limits))
     race = partial(apart, break_even, limits) if isolate else break_even
-    done = scaling(asked, specs, settings, keeping(kept, lost), measure, race)
+    done = scaling(asked, specs, settings, keeping(keeper), measure, race)
     tell(None)
     for row in done.rows:
         say(Kept("cases", row, stored=True))
@@ -68,10 +69,12 @@ def run(
         for row in rows:
             say(Kept(table, row))
     say(Found(done))
-    if lost:
-        raise InputError(f"{len(lost)} of {len(done.rows)} cases were not kept: {lost[0]}")
+    if lost := keeper.close():
+        say(Note(lost))
     if done.interrupted:
         raise KeyboardInterrupt
+    if lost:
+        return 1
     return 0 if any(row["status"] == "ok" for row in done.rows) else 1
 
 
@@ -102,16 +105,11 @@ def tell(row: Row | None) -> None:
         click.echo(f"\r\x1b[K{said[:70]}", nl=False, err=True)
 
 
-def keeping(kept: Path | None, lost: list[str]) -> Callable[[Outcome], None]:
-    """Puts a case into the store as soon as it is known; `lost` says why one is not there."""
-    store = None if kept is None else Store(kept)
+def keeping(keeper: Keeper) -> Callable[[Outcome], None]:
+    """Puts a case into the store as soon as it is known."""
 
     def append(outcome: Outcome) -> None:
-        try:
-            if store is not None:
-                store.append(outcome.row, outcome.samples, outcome.environment)
-        except InputError as error:  # a full disk, a lock: the row is printed all the same
-            lost.append(str(error))
+        keeper.append(outcome.row, outcome.samples, outcome.environment)
         if debugging():
             click.echo(plain(outcome.row["traceback"] or ""), err=True, nl=False)
         tell(outcome.row)

@@ -47,7 +47,7 @@ def run(
     judged = subject(made, spec.route, spec.options, p, solver)
     with suppress(NotConverged, SingularMatrix):  # a solve that fails is part of the verdict
         _refuse_beyond(budget, price_of(lambda: judged.objective(p))[0], plan)
-    page_writable(html, [kept, selector, route, at])
+    page_writable(html, kept, [selector, route, at])
     with stdout_to_stderr():
         found = check(judged, plan)
     return conclude(say, found, {"problem": selector, "route": route, "at": at}, html)

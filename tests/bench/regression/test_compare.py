@@ -13,7 +13,7 @@ from comparisons import HERE, MIB, WORK, case, ratios, row, side, stored
 from gradient_routes.bench.cases.expected import Expectation
 from gradient_routes.bench.cases.row import STATUSES
 from gradient_routes.bench.regression import rules
-from gradient_routes.bench.regression.baseline import measured, write
+from gradient_routes.bench.regression.baseline import as_text, measured
 from gradient_routes.bench.regression.compare import Comparison, compare
 from gradient_routes.bench.regression.finding import Finding
 from gradient_routes.bench.regression.measured import Verdict, of_store
@@ -86,7 +86,7 @@ def test_a_route_that_no_longer_runs_on_a_problem_is_worse_in_a_subset_too() -> 
 
 def test_a_baseline_keeps_the_budget(tmp_path: Path) -> None:
     path = stored(tmp_path / "s.sqlite", row(budget_s=60.0))
-    write(tmp_path / "b.json", of_store(Store(path)))
+    (tmp_path / "b.json").write_text(as_text(of_store(Store(path))))
     assert [c.row["budget_s"] for c in measured(tmp_path / "b.json").cases] == [60.0]
 
 

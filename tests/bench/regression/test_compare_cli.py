@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from comparisons import WORK, case, ratios, row, side, stored
 
-from gradient_routes.bench.regression.baseline import as_text, measured, write
+from gradient_routes.bench.regression.baseline import as_text, measured
 from gradient_routes.bench.regression.compare import compare
 from gradient_routes.bench.regression.measured import of_store
 from gradient_routes.bench.regression.text import as_json, markdown
@@ -31,7 +31,7 @@ def test_the_latest_row_of_a_case_counts_with_its_own_rounds(tmp_path: Path) -> 
 def test_a_baseline_says_what_its_store_says(tmp_path: Path) -> None:
     rows = [row(), row(route="tangent", status="failed", reason="of ~/private", work=None, host="my-host")]
     path = stored(tmp_path / "s.sqlite", *rows, seconds=ratios(n=120))
-    write(tmp_path / "b.json", of_store(Store(path)))
+    (tmp_path / "b.json").write_text(as_text(of_store(Store(path))))
     text = (tmp_path / "b.json").read_text()
     back = measured(tmp_path / "b.json")
     assert as_text(back) == text
@@ -52,7 +52,7 @@ def test_the_order_of_measuring_does_not_matter_to_a_baseline(tmp_path: Path) ->
 def base(tmp_path: Path) -> Path:
     """A store of one case that is ok, and its baseline beside it."""
     path = stored(tmp_path / "base.sqlite", row(), seconds=ratios())
-    write(tmp_path / "base.json", of_store(Store(path)))
+    (tmp_path / "base.json").write_text(as_text(of_store(Store(path))))
     return path
 
 
@@ -93,7 +93,7 @@ def test_expected_failures_are_read_beside_new_or_where_it_is_said(cli, tmp_path
     (tmp_path / "new").mkdir()
     for path in (tmp_path / "base.sqlite", tmp_path / "new" / "s.sqlite"):
         stored(path, row(route="tangent"))
-    write(tmp_path / "base.json", of_store(Store(tmp_path / "base.sqlite")))
+    (tmp_path / "base.json").write_text(as_text(of_store(Store(tmp_path / "base.sqlite"))))
     stored(tmp_path / "new" / "s.sqlite", row(status="timeout"))
     assert cli("compare", "base.json", "new/s.sqlite").code == 1
     entry = 'problem = "bar"\nroute = "adjoint"\nstatus = "timeout"\nreason = "it is slow"\n'
@@ -184,7 +184,7 @@ def test_no_output_replaces_what_is_read(cli, tmp_path: Path, base: Path) -> Non
     (tmp_path / "mine.txt").write_text("precious")
     ran = cli("baseline", "--store", "base.sqlite", "-o", "mine.txt")
     assert (ran.code, (tmp_path / "mine.txt").read_text()) == (2, "precious")
-    assert "is there and no baseline" in ran.err
+    assert "is there and no gradient-routes baseline" in ran.err
 
 
 def test_a_run_compares_to_its_own_baseline(cli) -> None:

@@ -356,9 +356,9 @@ def test_an_empty_store_says_what_to_run(cli, tmp_path: Path) -> None:
 
 
 MISUSE = {
-    "the store": (["-o", "routes.sqlite"], "is the store itself"),
-    "the store by a link": (["-o", "link.html"], "is the store itself"),
-    "a directory": (["-o", "folder"], "is a directory"),
+    "the store": (["-o", "routes.sqlite"], "is another file of this run"),
+    "the store by a link": (["-o", "link.html"], "is another file of this run"),
+    "a directory": (["-o", "folder"], "Is a directory"),
     "nowhere": (["-o", "nowhere/report.html"], "No such file"),
     "figures into a file": (["--figures", "routes.sqlite"], "exists"),
     "no store": (["-o", "report.html", "--store", "no.sqlite"], "no such file"),

@@ -1,0 +1,74 @@
+"""Rows on their way into a store that may fail: kept in memory, tried again, in the end written to a file apart."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.environment import Environment
+from gradient_routes.bench.cases.samples import Samples
+from gradient_routes.bench.store.store import BESIDE, Store
+from gradient_routes.problems.errors import InputError
+
+
+class Keeper:
+    """Appends rows to a store, where there is one. Those that it does not take wait, and are tried again."""
+
+    def __init__(self, store: Store | None) -> None:
+        self.store = store
+        self._waiting: list[tuple[Row, Samples | None, Environment | None]] = []
+        self._why = ""
+
+    def append(self, row: Row, samples: Samples | None, measured_in: Environment | None) -> None:
+        """Keep a row, and those that wait."""
+        if self.store is not None:
+            self._waiting.append((row, samples, measured_in))
+            self._store(self.store)
+
+    def close(self) -> str:
+        """Store what waits, or write it to a file apart. What to say of that; nothing where all is in the store."""
+        if self.store is None:
+            return ""
+        self._store(self.store)
+        if not self._waiting:
+            return ""
+        count = f"{len(self._waiting)} row{'s' * (len(self._waiting) != 1)}"
+        return apart(self.store, lambda other: other.append_all(self._waiting), f"{count} not kept: {self._why}")
+
+    def _store(self, store: Store) -> None:
+        """The first alone: as long as it fails, all others would."""
+        try:
+            while self._waiting:
+                batch = self._waiting[:1] if self._why else self._waiting[:]
+                store.append_all(batch)
+                del self._waiting[: len(batch)]
+                self._why = ""
+        except InputError as error:
+            self._why = str(error)
+
+
+def apart(store: Store, write: Callable[[Store], object], why: str) -> str:
+    """Write what `store` does not take to a store of its own. `why`, where it is now and how it is merged."""
+    for path in _places(store.path):
+        other = Store(path)
+        try:
+            write(other)
+        except InputError:
+            for end in ("", *BESIDE):
+                path.with_name(path.name + end).unlink(missing_ok=True)
+        else:
+            merge = shlex.join(["routes", "merge", str(path), "--store", str(store.path)])
+            return f"{why}; kept in {path} - later: {merge}"
+    return f"{why}; nor in any other folder"
+
+
+def _places(path: Path) -> Iterator[Path]:
+    """Files that there are not, beside a store, in the working folder and in that for temporary files."""
+    for folder in dict.fromkeys((path.parent, Path(), Path(tempfile.gettempdir()))):
+        place = folder / f"{path.stem or 'routes'}-unsaved-{os.getpid()}.sqlite"
+        if folder.is_dir() and not place.exists():
+            yield place
