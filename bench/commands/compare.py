@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from contextlib import AbstractContextManager, nullcontext, redirect_stdout
+import io
+from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -90,13 +90,15 @@ def _write(found: Comparison, format: str, output: Output | None) -> None:
     from gradient_routes.bench.regression.view import conclusion, show_comparison
     from gradient_routes.bench.render.terminal.tables import console
 
-    where: AbstractContextManager[Any] = nullcontext(sys.stdout) if output is None else output.text()
-    with where as file, redirect_stdout(file):
+    text = io.StringIO()
+    with nullcontext() if output is None else redirect_stdout(text):
         if format == "table":
             show_comparison(console(), found)
         else:
             click.echo(markdown(found) if format == "md" else as_json(found), nl=False)
     if output is not None:
+        with output.open() as file:
+            file.write(text.getvalue().encode("utf-8", "backslashreplace"))
         click.echo(f"{conclusion(found)}; all of it in {output.path}")
 
 

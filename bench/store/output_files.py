@@ -9,10 +9,12 @@ from __future__ import annotations
 import codecs
 import os
 import re
+import stat
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from errno import EACCES
 from pathlib import Path
 from typing import BinaryIO
 
@@ -41,33 +43,33 @@ class Output:
         `taken` are stores, other outputs and all that the command reads: see `read_by`.
         """
         with self._errors(InputError):
-            target = self._target()
-            if target.is_dir():
+            there = self._there()
+            if there is not None and stat.S_ISDIR(there.st_mode):
                 raise InputError(f"{self}: Is a directory - name a file in it")
+            target = self._file.resolve()
             if any(_same(target, near) for other in taken for near in _near(located(other).resolve())):
                 raise InputError(f"{self}: is another file of this run - name one of its own")
-            if target.exists() and not os.access(target, os.W_OK):
-                raise PermissionError(13, os.strerror(13))
-            if _stream(target) is not None or (target.exists() and not target.is_file()):
-                return  # a pipe or a device
-            self._check_kind(target)
-            check_folder(target.parent)
+            if there is not None and not os.access(self._file, os.W_OK):
+                raise PermissionError(EACCES, os.strerror(EACCES))
+            if there is None or (_stream(there) is None and stat.S_ISREG(there.st_mode)):
+                self._check_kind(target)
+                check_folder(target.parent)
 
     @contextmanager
     def open(self) -> Iterator[BinaryIO]:
         """The file to write. Raises RoutesError; then what was there is still there."""
         with self._errors(RoutesError):
-            target = self._target()
-            stream = _stream(target)
+            there = self._there()
+            stream = None if there is None else _stream(there)
             if stream is not None:  # opened anew it would overwrite what is printed
                 sys.stdout.flush()
                 with open(os.dup(stream), "wb") as file:
                     yield file
-            elif target.exists() and not target.is_file():
-                with target.open("wb") as file:
+            elif there is not None and not stat.S_ISREG(there.st_mode):  # a pipe or a device
+                with self._file.open("wb") as file:
                     yield file
             else:
-                with replacing(target) as file:
+                with replacing(self._file.resolve()) as file:
                     yield file
 
     @contextmanager
@@ -79,12 +81,16 @@ class Output:
     def __str__(self) -> str:
         return f"{self.option} {self.path}"
 
-    def _target(self) -> Path:
-        """What the name stands for, through symbolic links."""
+    @property
+    def _file(self) -> Path:
+        return located(self.path)
+
+    def _there(self) -> os.stat_result | None:
+        """What the name stands for, which need not have another one: the pipe behind /dev/stdout."""
         try:
-            return located(self.path).resolve()
-        except RuntimeError as error:  # links in a circle
-            raise InputError(f"{self}: {error} - {TODO}") from error
+            return self._file.stat()
+        except FileNotFoundError:
+            return None
 
     def _check_kind(self, target: Path) -> None:
         if not target.exists() or not target.stat().st_size:
@@ -138,13 +144,11 @@ def _same(one: Path, other: Path) -> bool:
     return one == other or (one.exists() and other.exists() and one.samefile(other))
 
 
-def _stream(target: Path) -> int | None:
-    """The descriptor of stdout or stderr, if that is where `target` leads: /dev/stdout of a redirected process."""
-    if not target.exists():
-        return None
+def _stream(there: os.stat_result) -> int | None:
+    """The descriptor of stdout or stderr, if that is what is there: /dev/stdout of a redirected process."""
     for number in (1, 2):
         try:
-            if os.path.samestat(target.stat(), os.fstat(number)):
+            if os.path.samestat(there, os.fstat(number)):
                 return number
         except OSError:  # closed
             continue

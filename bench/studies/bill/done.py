@@ -34,12 +34,12 @@ class Done:
     def take(self, outcome: Outcome) -> None:
         """Store a row at once; print it, as JSON, as soon as all rows before it are printed."""
         self._keeper.append(outcome.row, outcome.samples, outcome.environment)
+        slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
+        self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
         self._waiting[outcome.place] = outcome.row
         while self._next in self._waiting:
             self._print(self._next)
             self._next += 1
-        slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
-        self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
 
     def _print(self, place: int) -> None:
         from gradient_routes.bench.cases.row import as_json
