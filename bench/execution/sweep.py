@@ -88,6 +88,7 @@ class Sweep:
         known: list[Size | None] = [None] if len(todo) == 1 else sizes(todo, settings, guarded)
         self.groups: list[Group] = [(problem, size, routes) for problem, size in zip(todo, known, strict=True)]
         self.held: list[Group] = []  # by other runners, one route each
+        self.unstored = False  # whether this runner holds claims to its end, hence may not wait for others
         self.pruning = Pruning()
         self._places = itertools.count()
         self._started: dict[str, tuple[int, Case, Size | None]] = {}
@@ -100,8 +101,11 @@ class Sweep:
                 raise outcome.refusal
             begun = True
             yield outcome
-            if self.claims is not None:  # its row is stored
-                self.claims.release(outcome.row["case_key"])
+            if self.claims is not None:
+                if self.wanted(outcome.row):  # its row is not stored yet: nobody else shall run it
+                    self.unstored = True
+                else:
+                    self.claims.release(outcome.row["case_key"])
 
     def _outcomes(self) -> Iterator[Outcome]:
         while self.groups:
@@ -109,7 +113,7 @@ class Sweep:
                 place, case, size = self._started.pop(outcome.row["case_key"])
                 self.pruning.note(case.problem, case.route, size, outcome.row)
                 yield replace(outcome, place=place)
-            self.groups, self.held = self.held, []
+            self.groups, self.held = [] if self.unstored else self.held, []
             if self.claims is not None and self.groups:
                 self.claims.wait([self._asked(problem, route)["case_key"] for problem, _, (route,) in self.groups])
 

@@ -6,6 +6,7 @@ import os
 import shlex
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from gradient_routes.bench.cases.column import Row
@@ -59,7 +60,8 @@ def apart(store: Store, write: Callable[[Store], object], why: str) -> str:
             write(other)
         except InputError:
             for end in ("", *BESIDE):
-                path.with_name(path.name + end).unlink(missing_ok=True)
+                with suppress(OSError):  # a file system that is read-only says so even of what is not there
+                    path.with_name(path.name + end).unlink()
         else:
             merge = shlex.join(["routes", "merge", str(path), "--store", str(store.path)])
             return f"{why}; kept in {path} - later: {merge}"

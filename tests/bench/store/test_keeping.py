@@ -114,6 +114,19 @@ def test_a_folder_that_takes_no_journal_is_noticed(disk: Path) -> None:
         store.check_writable()
 
 
+def test_what_a_folder_that_became_read_only_does_not_take_is_kept_elsewhere(
+    disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(disk.parent)
+    keeper = Keeper(Store(disk / "s.sqlite"))
+    keeper.append(row(note="a"), None, None)
+    subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+    keeper.append(row(note="b"), None, None)
+    assert "1 row not kept: store" in keeper.close()
+    (apart,) = disk.parent.glob("*unsaved*")
+    assert [kept["note"] for kept in Store(apart).rows()] == ["b"]
+
+
 def test_rows_wait_for_a_disk_that_has_room_again(disk: Path) -> None:
     store = Store(disk / "s.sqlite")
     keeper = Keeper(store)
