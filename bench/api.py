@@ -266,15 +266,13 @@ def _routes(given: OneRoute | Sequence[OneRoute]) -> list[RouteSpec]:
 
 def _distinct(specs: Iterable[Spec], code_of: Callable[[Spec], Any]) -> list[Spec]:
     """Each once. Raises InputError where two differ in their code only: rows could not be told apart."""
-    found: list[Spec] = []
+    found: dict[str, Spec] = {}
     for spec in specs:
-        same = next((s for s in found if (s.name, s.options) == (spec.name, spec.options)), None)
-        if same is None:
-            found.append(spec)
-        elif code_of(same) is not code_of(spec):
+        same = found.setdefault(repr((spec.name, spec.options)), spec)
+        if code_of(same) is not code_of(spec):
             kind = "problems" if isinstance(spec, ProblemSpec) else "routes"
             raise InputError(f"{kind}: two are named '{spec.name}' - give each a name of its own")
-    return found
+    return list(found.values())
 
 
 def _one(specs: Sequence[Spec], given: object) -> Spec:

@@ -20,6 +20,7 @@ from gradient_routes.routes.route import Route
 from gradient_routes.routes.synthetic_data import with_synthetic_data
 
 NOTHING: declared.Told = {}
+MOST = 100_000  # cases of one command, unless its user allows more
 
 
 @dataclass(frozen=True)
@@ -114,22 +115,28 @@ def _target(kind: registry.Kind, name: str, told: declared.Told = NOTHING) -> An
     return target
 
 
-def problems(selectors: Iterable[str], told: declared.Told = NOTHING) -> list[ProblemSpec]:
+def problems(selectors: Iterable[str], told: declared.Told = NOTHING, most: float = MOST) -> list[ProblemSpec]:
     """All problems that the selectors name, grids expanded; the code of those that `told` describes is not imported.
 
-    Raises InputError, RoutesError where code of the user's own fails.
+    Raises InputError, for more than `most`, too, and RoutesError where code of the user's own fails.
     """
-    return [ProblemSpec(name, opts, target) for name, opts, target in _specs("problem", selectors, told)]
+    return [ProblemSpec(name, opts, target) for name, opts, target in _specs("problem", selectors, told, most)]
 
 
-def routes(selectors: Iterable[str], told: declared.Told = NOTHING) -> list[RouteSpec]:
+def routes(selectors: Iterable[str], told: declared.Told = NOTHING, most: float = MOST) -> list[RouteSpec]:
     """All routes that the selectors name, as `problems` does."""
     specs = []
-    for name, opts, target in _specs("route", selectors, told):
+    for name, opts, target in _specs("route", selectors, told, most):
         if ("route", name) not in told:  # where it was described options have been checked
             target.check(**opts)
         specs.append(RouteSpec(name, target, opts))
     return specs
+
+
+def check_count(count: int, what: str, most: float = MOST) -> None:
+    """Raise InputError for more than `most`."""
+    if count > most:
+        raise InputError(f"{count} {what} - name at most {MOST}, or lift that limit with `routes run --yes`")
 
 
 def left_out(problem_selectors: Iterable[str], route_selectors: Iterable[str]) -> list[str]:
@@ -140,25 +147,28 @@ def left_out(problem_selectors: Iterable[str], route_selectors: Iterable[str]) -
 
 
 def _specs(
-    kind: registry.Kind, selectors: Iterable[str], told: declared.Told
+    kind: registry.Kind, selectors: Iterable[str], told: declared.Told, most: float
 ) -> Iterator[tuple[str, dict[str, Any], Any]]:
-    seen: list[tuple[str, dict[str, Any]]] = []
-    for text in selectors:
-        chosen = selector.parse(text)
-        if chosen.name == "all":
-            if chosen.grid:
-                raise InputError(f"selector '{text}' - 'all' takes no options; name the {kind} to set one")
-            names = [name for name, entry in registry.entries(kind).items() if entry.sound]
-        else:
-            names = [chosen.name]
-        for name in names:
-            target = _target(kind, name, told)
-            known = declared.declared_by(target).options
-            for given in chosen.expand():
-                resolved = options.resolve(known, given, name)
-                if (name, resolved) not in seen:
-                    seen.append((name, resolved))
-                    yield name, resolved, target
+    grids = [grid for text in selectors for grid in _grids(kind, text)]
+    check_count(sum(grid.size for grid in grids), f"{kind}s", most)  # before a grid fills the memory
+    seen: set[str] = set()
+    for grid in grids:
+        target = _target(kind, grid.name, told)
+        for resolved in options.resolve(declared.declared_by(target).options, grid.grid, grid.name):
+            key = repr((grid.name, resolved))  # defaults need not be hashable
+            if key not in seen:
+                seen.add(key)
+                yield grid.name, resolved, target
+
+
+def _grids(kind: registry.Kind, text: str) -> list[selector.Selector]:
+    """What a selector names, `all` written out."""
+    chosen = selector.parse(text)
+    if chosen.name != "all":
+        return [chosen]
+    if chosen.grid:
+        raise InputError(f"selector '{text}' - 'all' takes no options; name the {kind} to set one")
+    return [selector.Selector(name, {}) for name, entry in registry.entries(kind).items() if entry.sound]
 
 
 def point(problem: Problem, at: str) -> Array:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import inspect
 import math
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from gradient_routes.bench.cases.suggest import did_you_mean
@@ -66,15 +67,15 @@ def _kinds(annotation: Any) -> tuple[Any, ...]:
     return (annotation,)
 
 
-def resolve(options: Mapping[str, Option], given: dict[str, str], who: str) -> dict[str, Any]:
-    """All options: defaults, overridden by the texts `given`. Raises InputError."""
-    unknown = [name for name in given if name not in options]
+def resolve(options: Mapping[str, Option], grid: dict[str, list[str]], who: str) -> Iterator[dict[str, Any]]:
+    """All options at each point of the grid of texts, defaults elsewhere. Raises InputError."""
+    unknown = [name for name in grid if name not in options]
     if unknown:
         known = did_you_mean(unknown[0], options)
         raise InputError(f"{who}: no option '{unknown[0]}' - {known or 'it has none'}")
-    return {
-        name: convert(option, given[name], who) if name in given else option.default for name, option in options.items()
-    }
+    values = [[convert(options[name], text, who) for text in texts] for name, texts in grid.items()]
+    defaults = {name: option.default for name, option in options.items()}
+    return (defaults | dict(zip(grid, point, strict=True)) for point in product(*values))
 
 
 def convert(option: Option, text: str, who: str) -> Any:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 from gradient_routes.problems.errors import InputError
@@ -11,14 +11,15 @@ from gradient_routes.problems.errors import InputError
 
 @dataclass(frozen=True)
 class Selector:
-    """A name and, per option, the texts it takes; `expand` gives their product."""
+    """A name and, per option, the texts it takes: a grid, their product."""
 
     name: str
     grid: dict[str, list[str]]
 
-    def expand(self) -> list[dict[str, str]]:
-        """One {option: text} for each point of the grid."""
-        return [dict(zip(self.grid, point, strict=True)) for point in product(*self.grid.values())]
+    @property
+    def size(self) -> int:
+        """Points of the grid."""
+        return math.prod(map(len, self.grid.values()))
 
 
 def parse(text: str) -> Selector:
@@ -46,7 +47,8 @@ def parse(text: str) -> Selector:
     for key, values in grid.items():
         if not key or "" in values.split("|"):
             raise InputError(f"selector '{text}': empty value or name in '{key}={values}' - write key=value or key=a|b")
-    return Selector(name, {key: [v.strip() for v in values.split("|")] for key, values in grid.items()})
+    texts = {key: dict.fromkeys(v.strip() for v in values.split("|")) for key, values in grid.items()}
+    return Selector(name, {key: [*values] for key, values in texts.items()})
 
 
 def _exact(value: Any) -> str:

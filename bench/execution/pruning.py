@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +19,6 @@ NO_SIZES = ("seed",)  # whole-number options that say nothing of size
 class Hit:
     """A case that met a limit."""
 
-    problem: ProblemSpec
-    route: RouteSpec
     size: Size
     row: Row
 
@@ -28,24 +27,27 @@ class Pruning:
     """What has met a limit so far."""
 
     def __init__(self) -> None:
-        self._hits: list[Hit] = []
+        self._hits: defaultdict[str, list[Hit]] = defaultdict(list)  # by all that is equal but for sizes
 
     def note(self, problem: ProblemSpec, route: RouteSpec, size: Size | None, row: Row) -> None:
         """Remember a row that met a limit."""
         if row["status"] in LIMITED and size is not None:
-            self._hits.append(Hit(problem, route, size, row))
+            self._hits[alike(problem, route)].append(Hit(size, row))
 
     def reason(self, problem: ProblemSpec, route: RouteSpec, size: Size | None) -> str | None:
         """Why a case is not tried, or None."""
         if size is None:
             return None
-        for hit in self._hits:
-            alike = hit.problem.name == problem.name and fixed(hit.problem.options) == fixed(problem.options)
-            same = (hit.route.name, hit.route.options) == (route.name, route.options)
-            if alike and same and size != hit.size and size[0] >= hit.size[0] and size[1] >= hit.size[1]:
+        for hit in self._hits.get(alike(problem, route), ()):
+            if size != hit.size and size[0] >= hit.size[0] and size[1] >= hit.size[1]:
                 where = f"n_u = {hit.size[0]}, n_p = {hit.size[1]}"
                 return f"{route.name}: {hit.row['status']} at {where} already - {todo(hit.row)}"
         return None
+
+
+def alike(problem: ProblemSpec, route: RouteSpec) -> str:
+    """What cases share that differ in sizes only."""
+    return repr((problem.name, fixed(problem.options), route.name, route.options))
 
 
 def fixed(options: dict[str, Any]) -> dict[str, Any]:

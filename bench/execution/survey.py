@@ -18,6 +18,8 @@ from gradient_routes.bench.execution.isolation.worker_process import WorkerProce
 from gradient_routes.bench.execution.pruning import Size
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
+BATCH = 1000  # problems that are sent to one process: those after one that ends it are sent again
+
 
 @dataclass(frozen=True)
 class Survey:
@@ -40,10 +42,12 @@ def sizes(problems: list[ProblemSpec], settings: Settings, limits: Limits | None
         return [_understood(surveyed(problem, settings.at)) for problem in problems]
     found: list[Size | None] = []
     while len(found) < len(problems):
-        with closing(WorkerProcess(Survey(problems[len(found) :], settings), limits)) as line:
-            while len(found) < len(problems) and isinstance(message := line.hear(), Returned):
+        batch = problems[len(found) : len(found) + BATCH]
+        before = len(found)
+        with closing(WorkerProcess(Survey(batch, settings), limits)) as line:
+            while len(found) < before + len(batch) and isinstance(message := line.hear(), Returned):
                 found.append(_understood(message.value))
-        if len(found) < len(problems):
+        if len(found) < before + len(batch):
             found.append(None)  # the one that it ended at
     return found
 

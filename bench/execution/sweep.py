@@ -83,7 +83,9 @@ class Sweep:
         claims: Claims | None = None,
     ) -> None:
         self.settings, self.how, self.wanted, self.claims = settings, how, wanted, claims
-        todo = [p for p in problems if any(wanted(self._asked(p, route)) for route in routes)]
+        todo = problems
+        if wanted is not everything:  # else nothing is asked twice
+            todo = [p for p in problems if any(wanted(self._asked(p, route)) for route in routes)]
         guarded = how.limits if how.isolate else None
         known: list[Size | None] = [None] if len(todo) == 1 else sizes(todo, settings, guarded)
         self.groups: list[Group] = [(problem, size, routes) for problem, size in zip(todo, known, strict=True)]

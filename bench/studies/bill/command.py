@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -51,6 +52,7 @@ TIMING = "Time the gradients; errors, counted work and memory are measured in an
 RESUME = "Run only cases that are missing in the store, failed, or stale: code, data or libraries changed."
 EXPECTED = "File of known failures and their reasons. [expected.toml beside the store]"
 ONLY = "Run only cases of one of these kinds; all: run every case again."
+YES = "Run more than 100 000 cases."
 
 
 @click.command()
@@ -72,6 +74,7 @@ ONLY = "Run only cases of one of these kinds; all: run every case again."
 @click.option("--resume", is_flag=True, help=RESUME)
 @click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
 @click.option("--expected", type=click.Path(path_type=Path), metavar="FILE.toml", help=EXPECTED)
+@click.option("--yes", is_flag=True, help=YES)
 @limit_options("a case", 600.0)
 @executor_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and nothing else.")
@@ -96,6 +99,7 @@ def run(
     resume: bool,
     only: Only | None,
     expected: Path | None,
+    yes: bool,
     isolate: bool,
     limits: Limits,
     executing: Executing,
@@ -131,9 +135,11 @@ def run(
     partial = chosen(components, directions, seed)
     how = executing(isolate, limits, timed)
     told = described(problems, routes, limits) if isolate else case.NOTHING
-    problem_specs, route_specs = case.problems(problems, told), case.routes(routes, told)
+    most = math.inf if yes else case.MOST
+    problem_specs, route_specs = case.problems(problems, told, most), case.routes(routes, told, most)
     files = Files(None if gradient in (None, SHOWN) else Path(gradient), vtu, sensitivities)
     count = len(problem_specs) * len(route_specs)
+    case.check_count(count, "cases", most)
     read = read_by(*problems, *routes, at, expected, kept and kept.parent / FILE)
     files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *read])
     if sensitivities is None:

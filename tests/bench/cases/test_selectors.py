@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated, Any, Literal
 
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gradient_routes.bench.cases import case, options, registry
 from gradient_routes.bench.cases.options import options_of, resolve
 from gradient_routes.bench.cases.selector import parse
+from gradient_routes.bench.cli import main
 from gradient_routes.problems.errors import InputError
 
 
@@ -24,21 +29,78 @@ def factory(
 
 
 @pytest.mark.parametrize(
-    ("text", "points"),
+    ("text", "grid"),
     [
-        ("bar", [{}]),
-        ("bar[]", [{}]),
-        ("bar[n=8]", [{"n": "8"}]),
-        (" bar[ n = 8 , x=1 ]", [{"n": "8", "x": "1"}]),
-        ("bar[n=8|16]", [{"n": "8"}, {"n": "16"}]),
-        ("bar[n=1|2,x=3|4]", [{"n": a, "x": b} for a in "12" for b in "34"]),
-        ("bar[nodes=1,3,5,n=8]", [{"nodes": "1,3,5", "n": "8"}]),
-        ("bar[data=a=b.csv]", [{"data": "a=b.csv"}]),
+        ("bar", {}),
+        ("bar[]", {}),
+        ("bar[n=8]", {"n": ["8"]}),
+        (" bar[ n = 8 , x=1 ]", {"n": ["8"], "x": ["1"]}),
+        ("bar[n=8|16|8]", {"n": ["8", "16"]}),
+        ("bar[n=1|2,x=3|4]", {"n": ["1", "2"], "x": ["3", "4"]}),
+        ("bar[nodes=1,3,5,n=8]", {"nodes": ["1,3,5"], "n": ["8"]}),
+        ("bar[data=a=b.csv]", {"data": ["a=b.csv"]}),
     ],
 )
-def test_selectors_expand(text: str, points: list[dict[str, str]]) -> None:
+def test_selectors_are_grids(text: str, grid: dict[str, list[str]]) -> None:
     assert parse(text).name == "bar"
-    assert parse(text).expand() == points
+    assert parse(text).grid == grid
+    assert parse(text).size == len([*product(*grid.values())])
+
+
+def test_grids_expand_to_their_product() -> None:
+    points = [(o["n"], o["x"]) for o in resolve(factory, {"n": ["1", "2"], "x": ["3", "4"]}, "t")]
+    assert points == [(1, 3.0), (1, 4.0), (2, 3.0), (2, 4.0)]
+
+
+def test_a_grid_is_expanded_in_linear_time(monkeypatch) -> None:
+    """A text is converted once however many points have it, and no point is compared with another."""
+    converted, compared = [], []
+
+    class Default:
+        def __eq__(self, other: object) -> bool:
+            compared.append(other)
+            return self is other
+
+    default = Default()
+
+    def make(*, a: int = 0, b: int = 0, c: Any = default) -> None: ...
+
+    monkeypatch.setattr(options, "convert", lambda option, text, who: converted.append(text) or int(text))
+    monkeypatch.setattr(registry, "find", lambda kind, name: registry.Entry(kind, Loaded(name, make)))
+    numbers = "|".join(map(str, range(100)))
+    specs = case.problems([f"made[a={numbers},b={numbers}]", f"made[a={numbers}]"])
+    assert len(specs) == 10_000  # a=k,b=0 is named twice
+    assert len(converted) == 300
+    assert not compared
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """In place of an entry point."""
+
+    name: str
+    target: Any
+    dist: None = None
+
+    def load(self) -> Any:
+        return self.target
+
+
+def test_more_cases_than_anybody_wants_are_refused_before_they_are_expanded() -> None:
+    thousand = "|".join(map(str, range(2, 1002)))
+    said = refusal(lambda: case.problems([f"bar[n={thousand},sensors={thousand},stop_at={thousand}]"]))
+    assert said == "1000000000 problems - name at most 100000, or lift that limit with `routes run --yes`"
+    assert len(case.problems(["bar[n=2|3|4]"], most=3)) == 3
+    assert refusal(lambda: case.problems(["bar[n=2|3|4]"], most=2)) is not None
+
+
+def test_cases_are_counted_before_the_first_runs(tmp_path) -> None:
+    """So are those of few problems and many routes; --yes runs them."""
+    problems = f"bar[n={'|'.join(map(str, range(2, 503)))}]"
+    routes = f"fd-central[step={'|'.join(map(str, range(1, 201)))}]"
+    asked = CliRunner().invoke(main, ["run", "--problem", problems, "--route", routes, "--no-store"])
+    assert (asked.exit_code, asked.output.count("\n")) == (2, 1)
+    assert "100200 cases - name at most 100000" in asked.output
 
 
 @pytest.mark.parametrize(
@@ -47,6 +109,12 @@ def test_selectors_expand(text: str, points: list[dict[str, str]]) -> None:
 def test_broken_selectors_say_how_to_write_one(text: str) -> None:
     with pytest.raises(InputError, match=r"^selector '.* - "):
         parse(text)
+
+
+def resolved(given_: dict[str, str], who: str = "t") -> dict[str, Any]:
+    """At a grid of one point."""
+    (point,) = resolve(factory, {name: [text] for name, text in given_.items()}, who)
+    return point
 
 
 def refusal(call) -> str | None:
@@ -60,20 +128,20 @@ def refusal(call) -> str | None:
 
 @given(st.text(max_size=30))
 def test_no_text_breaks_the_parser(text: str) -> None:
-    said = refusal(lambda: parse(text).expand())
+    said = refusal(lambda: parse(text))
     assert said is None or " - " in said
 
 
 @given(st.dictionaries(st.sampled_from(["n", "x", "on", "kind", "nodes", "m"]), st.text(max_size=10)))
 def test_no_text_breaks_the_options(given_: dict[str, str]) -> None:
-    said = refusal(lambda: resolve(factory, given_, "test"))
+    said = refusal(lambda: resolved(given_, "test"))
     assert said is None or said.startswith("test: ")
 
 
 def test_options_take_their_types() -> None:
     texts = {"n": "1e6", "x": "1e-3", "on": "True", "kind": "raw", "nodes": "1,2"}
-    assert resolve(factory, texts, "t") == {"n": 10**6, "x": 1e-3, "on": True, "kind": "raw", "nodes": "1,2"}
-    assert resolve(factory, {"x": "none"}, "t")["x"] is None
+    assert resolved(texts) == {"n": 10**6, "x": 1e-3, "on": True, "kind": "raw", "nodes": "1,2"}
+    assert resolved({"x": "none"})["x"] is None
     assert options_of(factory)["n"].help == "a count"
     assert options_of(factory)["kind"].text == "kind=log|raw"
 
@@ -95,5 +163,5 @@ def test_options_take_their_types() -> None:
 )
 def test_wrong_options_say_what_would_be_right(given_: dict[str, str], says: str) -> None:
     with pytest.raises(InputError) as caught:
-        resolve(factory, given_, "t")
+        resolved(given_)
     assert says in str(caught.value)
