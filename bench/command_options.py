@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from gradient_routes.bench.ranges import COUNT, FRACTION
 from gradient_routes.bench.sanitize import plain, unread
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.solvers.registry import DEFAULT, points
@@ -35,13 +36,13 @@ debug_option = click.option("--debug", is_flag=True, expose_value=False, help="S
 at_option = click.option("--at", default="start", show_default=True, metavar="start|true|FILE.csv", help=AT)
 rtol_option = click.option(
     "--rtol",
-    type=float,
+    type=FRACTION,
     default=1e-12,
     show_default=True,
     help="Forward solve: |R| / |R(u_0, p)| to reach.",
 )
 max_steps_option = click.option(
-    "--max-steps", type=int, default=50, show_default=True, help="Forward solve: largest number of Newton steps."
+    "--max-steps", type=COUNT, default=50, show_default=True, help="Forward solve: largest number of Newton steps."
 )
 linear_solver_option = click.option(
     "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default=DEFAULT, show_default=True, help=ITERATIVE

@@ -32,7 +32,9 @@ class Partial:
         """The problem in these few parameters; None where they are all there are."""
         n_p = len(p)
         if self.kind == "components":
-            if self.count >= n_p:
+            if self.count > n_p:
+                raise InputError(f"--components {self.count}: {problem.name} has {n_p} parameters - take at most {n_p}")
+            if self.count == n_p:
                 return None
             index = np.random.default_rng(self.seed).choice(n_p, self.count, replace=False)
             return components(problem, p, np.sort(index))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gradient_routes.bench.command_options import debug_option, replaces, store_option
-from gradient_routes.problems.errors import InputError
+from gradient_routes.bench.ranges import Real
 
 if TYPE_CHECKING:
     from gradient_routes.bench.regression.compare import Comparison
@@ -30,7 +30,7 @@ EXPECTED = "File of known failures. [expected.toml beside NEW, if it exists]"
 @click.argument("new", type=PATH)
 @click.option("--format", type=click.Choice(["table", "md", "json"]), help="[by the suffix of FILE, else table]")
 @click.option("-o", "--output", type=PATH, metavar="FILE", help=OUTPUT)
-@click.option("--factor", type=float, default=1.25, show_default=True, help=FACTOR)
+@click.option("--factor", type=Real(min=1.0, min_open=True), default=1.25, show_default=True, help=FACTOR)
 @click.option("--subset", is_flag=True, help=SUBSET)
 @click.option("--expected", type=PATH, metavar="FILE", help=EXPECTED)
 @debug_option
@@ -67,8 +67,6 @@ def compare(
     from gradient_routes.bench.regression.compare import compare as compare_sides
     from gradient_routes.bench.store.output_files import Output
 
-    if not 1 < factor < float("inf"):
-        raise InputError(f"--factor {factor:g} - give a number > 1")
     known = expectations.beside(new) if expected is None else expectations.read(expected)
     sides = measured(base), measured(new)
     file = None if output is None else Output("compare -o", output, (".md", ".json", ".txt"))

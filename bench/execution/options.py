@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from gradient_routes.bench.command_options import Command, complain, refuse_given
+from gradient_routes.bench.ranges import SECONDS, Whole
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ MEMORY = "Resident memory at which it is killed, as 4GiB or 500MB. [all of the m
 THREADS = "Number of threads of each of BLAS, PARDISO and XLA."
 AFFINITY = "Processors to run on, as 0 or 0,2-3. [any]"
 KINDS = ("local", "dask")
+FEW = Whole(1, 4096)
 EXECUTOR = "Run on this machine or on a Dask cluster, one case at a time per worker (timed: per host)."
 SCHEDULER = "Address of the Dask scheduler, as tcp://HOST:8786. [a local cluster]"
 WORKERS = "Number of workers of a local Dask cluster. [1; with --no-timing one per processor]"
@@ -53,18 +55,18 @@ def limit_options(what: str, timeout: float, last_words: float = 0.0) -> Callabl
             if isolate and os.name != "posix":
                 raise InputError("--isolate: needs pipes and process groups of POSIX - give --no-isolate here")
             limits = given.Limits(
-                given.checked_timeout(timeout),
+                timeout,
                 given.memory_of(memory),
-                given.checked_threads(threads),
+                threads,
                 given.affinity_of(affinity),
             )
             return command(isolate=isolate, limits=limits, **others)
 
         options = (
             click.option("--isolate/--no-isolate", default=True, show_default=True, help=ISOLATE),
-            click.option("--timeout", type=float, default=timeout, show_default=True, help=ends),
+            click.option("--timeout", type=SECONDS, default=timeout, show_default=True, help=ends),
             click.option("--memory", metavar="SIZE", help=MEMORY),
-            click.option("--threads", type=int, default=1, show_default=True, help=THREADS),
+            click.option("--threads", type=FEW, default=1, show_default=True, help=THREADS),
             click.option("--affinity", metavar="LIST", help=AFFINITY),
         )
         decorated: Command = with_limits
@@ -95,8 +97,8 @@ def executor_options(command: Command) -> Command:
     options = (
         click.option("--executor", type=click.Choice(KINDS), default="local", show_default=True, help=EXECUTOR),
         click.option("--scheduler", metavar="ADDRESS", help=SCHEDULER),
-        click.option("--workers", type=int, metavar="N", help=WORKERS),
-        click.option("--jobs", type=int, default=1, show_default=True, help=JOBS),
+        click.option("--workers", type=FEW, metavar="N", help=WORKERS),
+        click.option("--jobs", type=FEW, default=1, show_default=True, help=JOBS),
     )
     decorated: Command = with_executor
     for option in reversed(options):
@@ -108,8 +110,6 @@ def here(isolate: bool, limits: Limits, timed: bool, jobs: int) -> How:
     """On this machine. Raises InputError for what does not go together."""
     from gradient_routes.bench.execution.sweep import How
 
-    if jobs < 1:
-        raise InputError(f"--jobs {jobs} - give 1 or more")
     if jobs > 1 and timed:
         raise InputError(f"--jobs {jobs}: cases side by side spoil each other's timing - add --no-timing")
     if jobs > 1 and not isolate:
@@ -125,8 +125,6 @@ def by_dask(isolate: bool, limits: Limits, timed: bool, scheduler: str | None, w
 
     if not isolate:
         raise InputError("--executor dask: cases on its workers run in processes of their own - drop --no-isolate")
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers} - give 1 or more")
     if workers is not None and workers > 1 and timed:
         raise InputError(f"--workers {workers}: cases side by side spoil each other's timing - add --no-timing")
     try:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gradient_routes.bench.ranges import SECONDS
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ PROBLEM = "NAME, 'NAME[key=value]' or FILE.py:NAME: one problem."
 BUDGET = "Skip what is predicted to take more seconds; inf forces it."
 
 problem_option = click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM)
-budget_option = click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
+budget_option = click.option("--budget", type=SECONDS, default=60.0, show_default=True, help=BUDGET)
 
 
 def one_problem(selector: str) -> ProblemSpec:

@@ -87,17 +87,3 @@ def affinity_of(text: str | None) -> tuple[int, ...] | None:
 
 def _listed(numbers: set[int]) -> str:
     return ",".join(map(str, sorted(numbers)))
-
-
-def checked_timeout(seconds: float) -> float:
-    """Raises InputError for what is no time."""
-    if not seconds > 0:
-        raise InputError(f"--timeout {seconds:g} - give seconds > 0, or inf")
-    return seconds
-
-
-def checked_threads(threads: int) -> int:
-    """Raises InputError."""
-    if not 1 <= threads <= 4096:
-        raise InputError(f"--threads {threads} - give 1 or more")
-    return threads

@@ -15,7 +15,6 @@ import click
 from gradient_routes.bench.command_options import (
     SELECTOR,
     at_option,
-    checked,
     complain,
     debug_option,
     debugging,
@@ -25,7 +24,7 @@ from gradient_routes.bench.command_options import (
     store_options,
 )
 from gradient_routes.bench.execution.options import executor_options, limit_options
-from gradient_routes.problems.errors import InputError
+from gradient_routes.bench.ranges import MANY, SECONDS, SEED, SHORT
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
@@ -59,13 +58,13 @@ YES = "Run more than 100 000 cases."
 @click.option("--problem", "problems", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
 @click.option("--route", "routes", multiple=True, required=True, metavar="SELECTOR", help=SELECTOR)
 @at_option
-@click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET)
-@click.option("--min-time", type=float, default=0.1, show_default=True, help="Time each gradient for this long [s].")
+@click.option("--budget", type=SECONDS, default=60.0, show_default=True, help=BUDGET)
+@click.option("--min-time", type=SHORT, default=0.1, show_default=True, help="Time each gradient for this long [s].")
 @click.option("--timing/--no-timing", "timed", default=True, show_default=True, help=TIMING)
 @solver_options
-@click.option("--components", type=int, metavar="M", help=COMPONENTS)
-@click.option("--directions", type=int, metavar="M", help=DIRECTIONS)
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of --components and --directions.")
+@click.option("--components", type=MANY, metavar="M", help=COMPONENTS)
+@click.option("--directions", type=MANY, metavar="M", help=DIRECTIONS)
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of --components and --directions.")
 @click.option("--gradient", is_flag=False, flag_value=SHOWN, metavar="[FILE.csv]", help=GRADIENT)
 @click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU)
 @click.option("--sensitivities", type=click.Path(path_type=Path), metavar="FILE", help=SENSITIVITIES)
@@ -130,8 +129,6 @@ def run(
     from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
     from gradient_routes.bench.studies.bill.sensitivity_files import wanted as columns_wanted
 
-    if not 0 <= min_time < float("inf"):
-        raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     partial = chosen(components, directions, seed)
     how = executing(isolate, limits, timed)
     told = described(problems, routes, limits) if isolate else case.NOTHING
@@ -149,7 +146,6 @@ def run(
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")
     du_dp = columns_wanted(sensitivities, sensitivities_of, columns, files.fields)
-    budget = checked(budget)
     settings = Settings(at, budget, min_time, timed, gradient is not None, solver, partial, files.fields, du_dp)
     store = None if kept is None else Store(kept)
     known = _expectations(expected, kept)

@@ -9,6 +9,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Options, Rule, Study
 from gradient_routes.bench.command_options import at_option, replaces, solver_options
+from gradient_routes.bench.ranges import FROM_ZERO, MANY, SEED
 from gradient_routes.bench.verification.columns import CHECKS, POINTS
 
 ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
@@ -47,10 +48,10 @@ STUDY = Study(
         click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract."),
         click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract."),
         at_option,
-        click.option("--budget", type=int, default=240, show_default=True, help="Objective calls at most."),
-        click.option("--accept", type=float, default=0.0, metavar="ERROR", help=ACCEPT),
+        click.option("--budget", type=MANY, default=240, show_default=True, help="Objective calls at most."),
+        click.option("--accept", type=FROM_ZERO, default=0.0, metavar="ERROR", help=ACCEPT),
         solver_options,
-        click.option("--seed", type=int, default=0, show_default=True, help="Of random directions."),
+        click.option("--seed", type=SEED, default=0, show_default=True, help="Of random directions."),
         HTML,
     ),
     rules=(

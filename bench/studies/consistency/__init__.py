@@ -7,6 +7,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
+from gradient_routes.bench.ranges import COUNT, FROM_ZERO
 from gradient_routes.bench.studies.consistency.columns import CONSISTENCY, STEPS
 from gradient_routes.bench.studies.options import PROBLEM
 
@@ -32,8 +33,8 @@ STUDY = Study(
         routes_option("adjoint and all inconsistent ones", given=()),
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help="How."),
-        click.option("--iterations", type=int, default=200, show_default=True, help="At most."),
-        click.option("--tolerance", type=float, default=1e-8, show_default=True, help=TOLERANCE),
+        click.option("--iterations", type=COUNT, default=200, show_default=True, help="At most."),
+        click.option("--tolerance", type=FROM_ZERO, default=1e-8, show_default=True, help=TOLERANCE),
         solver_options,
     ),
     tables={"consistency": Table(CONSISTENCY, QUESTION), "consistency_steps": Table(STEPS, QUESTION)},

@@ -9,6 +9,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Rule, Study
 from gradient_routes.bench.command_options import at_option, replaces, solver_options
+from gradient_routes.bench.ranges import COUNT, POSITIVE
 from gradient_routes.bench.studies.identify.columns import EXPERIMENTS, IDENTIFIED, PLACEMENT, SPECTRUM
 from gradient_routes.bench.studies.options import problem_option
 
@@ -38,15 +39,15 @@ STUDY = Study(
     options=(
         problem_option,
         at_option,
-        click.option("--noise", type=float, metavar="SIGMA", help=NOISE),
+        click.option("--noise", type=POSITIVE, metavar="SIGMA", help=NOISE),
         click.option("--sensors", multiple=True, metavar="VALUE", help=OTHER.format("sensors")),
         click.option("--cases", multiple=True, metavar="VALUE", help=OTHER.format("cases")),
         click.option("--stop", multiple=True, metavar="VALUE", help=OTHER.format("stop")),
         click.option("--vary", multiple=True, metavar="KEY=VALUE", help=VARY),
-        click.option("--place", type=int, metavar="K", help=PLACE),
+        click.option("--place", type=COUNT, metavar="K", help=PLACE),
         click.option("--criterion", type=click.Choice(["D", "A"]), default="D", show_default=True, help=CRITERION),
         click.option("--afresh", is_flag=True, help=AFRESH),
-        click.option("--modes", type=int, metavar="K", help=MODES),
+        click.option("--modes", type=COUNT, metavar="K", help=MODES),
         click.option("--vtu", type=click.Path(path_type=Path), metavar="FILE.vtu", help=VTU),
         solver_options,
     ),

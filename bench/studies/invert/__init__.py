@@ -8,13 +8,14 @@ from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Rule, Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
 from gradient_routes.bench.inversion.columns import ESTIMATES, INVERSION, LCURVE, TRADEOFF
+from gradient_routes.bench.ranges import COUNT, FROM_ZERO, POSITIVE, SEED, Whole
 from gradient_routes.bench.studies.options import problem_option
 
 POSITIVES = ["none", "log", "softplus"]
 OPTIMIZERS = ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 OPTIMIZER = "gauss-newton, levenberg-marquardt and trust use d(S u)/dp; descent is for comparison, adam for --minibatch"
 TOLERANCE = "Ends where |dJ/dp| is this fraction of its value at the start."
-POSITIVE = "How a raw parameter is kept > 0: its logarithm varies, or the argument of softplus."
+RAW = "How a raw parameter is kept > 0: its logarithm varies, or the argument of softplus."
 ALPHA_SWEEP = "J minimized at COUNT weights of Phi from LEAST to MOST: the L-curve."
 DRAWS = "The same for N draws of the noise: bias and variance against alpha."
 MINIBATCH = "Gradients of K load cases at a time, drawn at random, for adam."
@@ -43,20 +44,22 @@ STUDY = Study(
         routes_option("adjoint"),
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help=OPTIMIZER),
-        click.option("--iterations", type=int, default=200, show_default=True, help="At most."),
-        click.option("--tolerance", type=float, default=1e-8, show_default=True, help=TOLERANCE),
+        click.option("--iterations", type=COUNT, default=200, show_default=True, help="At most."),
+        click.option("--tolerance", type=FROM_ZERO, default=1e-8, show_default=True, help=TOLERANCE),
         click.option(
             "--positive",
             type=click.Choice(POSITIVES),
             default="none",
             show_default=True,
-            help=POSITIVE,
+            help=RAW,
         ),
-        click.option("--alpha-sweep", type=(float, float, int), metavar="LEAST MOST COUNT", help=ALPHA_SWEEP),
-        click.option("--draws", type=int, metavar="N", help=DRAWS),
-        click.option("--minibatch", type=int, metavar="K", help=MINIBATCH),
-        click.option("--rate", type=float, default=0.1, show_default=True, help=RATE),
-        click.option("--seed", type=int, default=0, show_default=True, help="Of the minibatches."),
+        click.option(
+            "--alpha-sweep", type=(POSITIVE, POSITIVE, Whole(2, 10_000)), metavar="LEAST MOST COUNT", help=ALPHA_SWEEP
+        ),
+        click.option("--draws", type=Whole(2), metavar="N", help=DRAWS),
+        click.option("--minibatch", type=COUNT, metavar="K", help=MINIBATCH),
+        click.option("--rate", type=POSITIVE, default=0.1, show_default=True, help=RATE),
+        click.option("--seed", type=SEED, default=0, show_default=True, help="Of the minibatches."),
         click.option("--resume", is_flag=True, help=RESUME),
         solver_options,
     ),

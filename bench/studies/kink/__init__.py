@@ -7,6 +7,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
+from gradient_routes.bench.ranges import POSITIVE, Whole
 from gradient_routes.bench.studies.kink.columns import KINK
 from gradient_routes.bench.studies.options import budget_option, problem_option
 
@@ -27,8 +28,8 @@ STUDY = Study(
         problem_option,
         routes_option("all", given=()),
         at_option,
-        click.option("--range", "s_range", nargs=2, type=float, default=(0.25, 4.0), show_default=True, help=RANGE),
-        click.option("--points", type=int, default=33, show_default=True, help="Factors in that range."),
+        click.option("--range", "s_range", nargs=2, type=POSITIVE, default=(0.25, 4.0), show_default=True, help=RANGE),
+        click.option("--points", type=Whole(2, 100_000), default=33, show_default=True, help="Factors in that range."),
         budget_option,
         solver_options,
     ),

@@ -16,7 +16,6 @@ import numpy as np
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
-from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import prices, unaffordable
 from gradient_routes.bench.execution.references import Judge, Judges
 from gradient_routes.bench.studies.kink.event import NEAR, Event, Kink, Side, Slope, Stencil, Visit
@@ -54,9 +53,6 @@ def run(
     low, high = s_range
     if not 0 < low < high < math.inf:
         raise InputError(f"--range {low:g} {high:g} - give two factors, 0 < least < largest")
-    if points < 2:
-        raise InputError(f"--points {points} - give at least 2")
-    checked(budget)
     specs = routes_of(routes or ["all"], say)
     ray = Ray(*problem_at(selector, at), solver)
     failure = traded = None

@@ -7,10 +7,12 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
+from gradient_routes.bench.ranges import MANY, SECONDS, SHORT, Real, Whole
 from gradient_routes.bench.studies.scaling.columns import BREAK_EVEN, SCALING_FITS
 
 PROBLEM = "NAME, whose n grows, or a grid of sizes: 'NAME[n=8|64|512]'."
 FROM = "n to begin with. [that of the problem]"
+GROWTHS = Real(min=1.0, min_open=True, max=1e6)
 GROWTH = "Unknowns of a level over those of the level before."
 BUDGET = "End of a route: gradients predicted to take more seconds; inf forces them."
 QUESTION = ("problem", "problem_options", "at", "route", "route_options")
@@ -28,11 +30,11 @@ STUDY = Study(
         click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM),
         routes_option("all"),
         at_option,
-        click.option("--from", "first", type=int, metavar="N", help=FROM),
-        click.option("--growth", type=float, default=4.0, show_default=True, help=GROWTH),
-        click.option("--levels", type=int, default=10, show_default=True, help="Sizes at most."),
-        click.option("--budget", type=float, default=10.0, show_default=True, help=BUDGET),
-        click.option("--min-time", type=float, default=0.1, show_default=True, help="Seconds of steady calls to time."),
+        click.option("--from", "first", type=MANY, metavar="N", help=FROM),
+        click.option("--growth", type=GROWTHS, default=4.0, show_default=True, help=GROWTH),
+        click.option("--levels", type=Whole(1, 1000), default=10, show_default=True, help="Sizes at most."),
+        click.option("--budget", type=SECONDS, default=10.0, show_default=True, help=BUDGET),
+        click.option("--min-time", type=SHORT, default=0.1, show_default=True, help="Seconds of steady calls to time."),
         solver_options,
     ),
     tables={

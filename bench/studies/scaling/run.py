@@ -15,7 +15,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
-from gradient_routes.bench.command_options import checked, debugging, refuse_given
+from gradient_routes.bench.command_options import debugging, refuse_given
 from gradient_routes.bench.execution.describing import described
 from gradient_routes.bench.execution.executors.isolated import called
 from gradient_routes.bench.execution.isolation.limits import Limits
@@ -51,13 +51,11 @@ def run(
     kept: Path | None,
 ) -> int:
     """Ctrl-C ends the study, not what it has measured."""
-    if not 0 <= min_time < float("inf"):
-        raise InputError(f"--min-time {min_time:g} - give seconds >= 0")
     told = described([selector], routes, limits) if isolate else case.NOTHING
     count = (lambda spec: int(called(unknowns, (spec,), limits))) if told else unknowns
     asked = sizes_of(case.problems([selector], told), first, growth, levels, count)
     specs = routes_of(routes, say, told)
-    settings = Settings(at, checked(budget), min_time, solver=solver)
+    settings = Settings(at, budget, min_time, solver=solver)
     keeper = Keeper(None if kept is None else Store(kept))
     measure = partial(run_cases, how=How(isolate, limits))
     race = partial(apart, break_even, limits) if isolate else break_even
@@ -89,8 +87,6 @@ def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], setti
 
 def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels: int, count: Count) -> Sizes:
     """What to measure on. Raises InputError."""
-    if not 1.0 < growth < float("inf") or levels < 1:
-        raise InputError(f"--growth {growth:g} --levels {levels} - give a growth > 1 and at least one level")
     if len(specs) > 1:
         refuse_given(("growth", "levels"), "the sizes are those of the grid")
         if first is not None:

@@ -7,6 +7,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import LINEAR_SOLVERS, at_option, routes_option
+from gradient_routes.bench.ranges import FRACTION, Whole
 from gradient_routes.bench.studies.options import budget_option, problem_option
 from gradient_routes.bench.studies.tolerance.columns import TOLERANCE
 
@@ -27,12 +28,12 @@ STUDY = Study(
         problem_option,
         routes_option("all"),
         at_option,
-        click.option("--loosest", type=float, default=1e-1, show_default=True, help="Tolerance to begin with."),
-        click.option("--tightest", type=float, default=1e-14, show_default=True, help="Tolerance to end with."),
-        click.option("--per-decade", type=int, default=1, show_default=True, help="Tolerances per decade."),
+        click.option("--loosest", type=FRACTION, default=1e-1, show_default=True, help="Tolerance to begin with."),
+        click.option("--tightest", type=FRACTION, default=1e-14, show_default=True, help="Tolerance to end with."),
+        click.option("--per-decade", type=Whole(1, 1000), default=1, show_default=True, help="Tolerances per decade."),
         click.option("--sweep", type=click.Choice(["forward", "adjoint", "both"]), help=SWEEP),
-        click.option("--rtol", type=float, help=RTOL),
-        click.option("--adjoint-rtol", type=float, help=ADJOINT_RTOL),
+        click.option("--rtol", type=FRACTION, help=RTOL),
+        click.option("--adjoint-rtol", type=FRACTION, help=ADJOINT_RTOL),
         click.option("--linear-solver", type=click.Choice(LINEAR_SOLVERS), help=SOLVER),
         budget_option,
     ),

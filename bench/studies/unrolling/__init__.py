@@ -7,6 +7,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option
+from gradient_routes.bench.ranges import COUNT, Real
 from gradient_routes.bench.studies.options import budget_option, problem_option
 from gradient_routes.bench.studies.unrolling.columns import UNROLLING, UNROLLING_FITS
 
@@ -26,9 +27,9 @@ STUDY = Study(
         problem_option,
         at_option,
         click.option("--inner", type=click.Choice(["cg", "richardson", "jacobi", "direct"]), help=INNER),
-        click.option("--checkpoint", type=int, metavar="C", help=CHECKPOINT),
-        click.option("--max-iterations", type=int, default=4096, show_default=True, help="Largest k."),
-        click.option("--within", type=float, default=10.0, show_default=True, help=WITHIN),
+        click.option("--checkpoint", type=COUNT, metavar="C", help=CHECKPOINT),
+        click.option("--max-iterations", type=COUNT, default=4096, show_default=True, help="Largest k."),
+        click.option("--within", type=Real(min=1.0), default=10.0, show_default=True, help=WITHIN),
         budget_option,
     ),
     tables={"unrolling": Table(UNROLLING, QUESTION), "unrolling_fits": Table(UNROLLING_FITS, QUESTION)},

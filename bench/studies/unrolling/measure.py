@@ -18,7 +18,6 @@ from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import ProblemSpec
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.study import Found, Kept, Say
-from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import price_of, unaffordable
 from gradient_routes.bench.execution.timing import rounds
 from gradient_routes.bench.studies.judged import TIGHT, Bench, said
@@ -112,7 +111,7 @@ def run(
     budget: float,
     kept: Path | None = None,
 ) -> None:
-    done = unrolling(one_problem(selector), at, inner, checkpoint, max_iterations, within, checked(budget))
+    done = unrolling(one_problem(selector), at, inner, checkpoint, max_iterations, within, budget)
     for table, rows in done.tables.items():
         for row in rows:
             say(Kept(table, row))

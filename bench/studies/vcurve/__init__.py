@@ -6,6 +6,7 @@ import click
 
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, solver_options
+from gradient_routes.bench.ranges import POSITIVE, SECONDS, SEED, Whole
 from gradient_routes.bench.studies.check import HTML, TABLES
 from gradient_routes.bench.studies.options import problem_option
 
@@ -25,14 +26,14 @@ STUDY = Study(
         click.option("--route", required=True, metavar="SELECTOR", help="The route whose gradient is judged."),
         at_option,
         click.option("--components", metavar="M|LIST", help=COMPONENTS),
-        click.option("--directions", type=int, default=2, show_default=True, help="Random directions."),
+        click.option("--directions", type=Whole(1, 1000), default=2, show_default=True, help="Random directions."),
         click.option(
-            "--steps", nargs=2, type=float, default=(1e-16, 1.0), show_default=True, help="Least and largest h."
+            "--steps", nargs=2, type=POSITIVE, default=(1e-16, 1.0), show_default=True, help="Least and largest h."
         ),
-        click.option("--per-decade", type=int, default=4, show_default=True, help="Steps per decade."),
-        click.option("--budget", type=float, default=60.0, show_default=True, help=BUDGET),
+        click.option("--per-decade", type=Whole(2, 100), default=4, show_default=True, help="Steps per decade."),
+        click.option("--budget", type=SECONDS, default=60.0, show_default=True, help=BUDGET),
         solver_options,
-        click.option("--seed", type=int, default=0, show_default=True, help="Of the directions."),
+        click.option("--seed", type=SEED, default=0, show_default=True, help="Of the directions."),
         HTML,
     ),
     tables=TABLES,

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.study import Say
-from gradient_routes.bench.command_options import checked
 from gradient_routes.bench.execution.cost_model import price_of
 from gradient_routes.bench.studies.check.conclude import conclude, page_writable
 from gradient_routes.bench.studies.options import one_route, problem_at
@@ -38,7 +37,6 @@ def run(
     html: Path | None,
     kept: Path | None,
 ) -> int:
-    checked(budget)
     spec = one_route(route)
     made, p = problem_at(selector, at)
     few: int | tuple[int, ...] = FEW if made.typical is None else (made.typical,)

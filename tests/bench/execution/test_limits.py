@@ -36,7 +36,7 @@ def test_limits_without_processes_are_refused(cli) -> None:
         (("--timeout", "3"), "--timeout: holds for processes of their own"),
         (("--memory", "1GiB"), "--memory: holds for processes of their own"),
         (("--jobs", "2", "--no-timing"), "--jobs 2: needs processes"),
-        (("--threads", "0"), "--threads 0 - give 1 or more"),
+        (("--threads", "0"), "--threads 0 - give a whole number from 1"),
     ):
         ran = cli(*run, *given)
         assert (ran.code, says in ran.err, ran.err.count("\n")) == (2, True, 1), ran.err

@@ -370,14 +370,14 @@ def test_all_components_are_the_whole(cli, count: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ("--components 0", "--components 0 - give at least 1"),
-        ("--components -3", "--components -3 - give at least 1"),
-        ("--components x", "'x' is not a valid integer"),
-        ("--directions 0", "--directions 0 - give at least 1"),
-        ("--directions 1.5", "'1.5' is not a valid integer"),
+        ("--components 0", "--components 0 - give a whole number from 1"),
+        ("--components -3", "--components -3 - give a whole number from 1"),
+        ("--components x", "--components x - give a whole number"),
+        ("--directions 0", "--directions 0 - give a whole number from 1"),
+        ("--directions 1.5", "--directions 1.5 - give a whole number"),
         ("--components 2 --directions 2", "give one of them"),
         ("--directions 2 --seed -1", "--seed -1"),
-        ("--directions 1000000000000", "of memory at hand - take fewer"),
+        ("--directions 1000000000", "of memory at hand - take fewer"),
     ],
 )
 def test_wrong_parts_are_one_line(cli, arguments: str, says: str) -> None:

@@ -136,7 +136,7 @@ def test_json_is_rows_of_the_declared_columns(cli) -> None:
     ("arguments", "says"),
     [
         (("--iterations", "0"), "--iterations 0"),
-        (("--tolerance", "1"), "a tolerance below 1"),
+        (("--tolerance", "1"), "--tolerance 1 - give a number >= 0 and < 1"),
         (("--problem", "all"), "name one"),
         (("--route", "nobody"), "no route 'nobody'"),
         (("--optimizer", "adam"), "'adam'"),

@@ -338,7 +338,7 @@ WRONG = {
     "--sensors 9": "there are 8",
     "--vary alpha": "write KEY=VALUE",
     "--place 1": "give --noise SIGMA",
-    "--place 0 --noise 0.1": "at least 1 sensor",
+    "--place 0 --noise 0.1": "give a whole number from 1",
     "--place 4 --noise 0.1": "there are 3 candidates",
     "--criterion A": "--criterion",
     "--vtu f.vtu": "has no mesh",

@@ -203,13 +203,13 @@ def test_the_screen_shows_a_plot_and_residuals_beside_errors(cli) -> None:
 
 WRONG = {
     "--route adjiont": "did you mean 'adjoint'?",
-    "--loosest 2": "give 1 > loosest >= tightest > 0",
+    "--loosest 2": "--loosest 2 - give a number > 0 and < 1",
     "--loosest 1e-9 --tightest 1e-3": "give 1 > loosest >= tightest > 0",
-    "--tightest 0": "give 1 > loosest >= tightest > 0",
-    "--per-decade 0": "at least 1",
+    "--tightest 0": "--tightest 0 - give a number > 0 and < 1",
+    "--per-decade 0": "give a whole number from 1 to 1000",
     "--rtol 1e-9": "add --sweep adjoint",
     "--sweep both --adjoint-rtol 1e-9": "take --sweep forward",
-    "--adjoint-rtol 3": "between 0 and 1",
+    "--adjoint-rtol 3": "--adjoint-rtol 3 - give a number > 0 and < 1",
     "--budget 0": "--budget",
     "--problem bar[n=8|9]": "names 2 problems",
     "--linear-solver gauss": "'gauss'",

@@ -96,9 +96,9 @@ def test_the_screen_tells_where_they_meet(cli) -> None:
 
 
 WRONG = {
-    "--checkpoint 0": "checkpoint=0 - choose at least 1",
-    "--max-iterations 0": "give at least 1",
-    "--within 0.5": "give at least 1",
+    "--checkpoint 0": "--checkpoint 0 - give a whole number from 1",
+    "--max-iterations 0": "give a whole number from 1",
+    "--within 0.5": "give a number >= 1",
     "--budget nan": "--budget",
     "--inner newton": "'newton'",
     "--inner direct --checkpoint 4": "inner=direct",
