@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered
+from gradient_routes.problems.text import shortened
 
 if TYPE_CHECKING:
     from gradient_routes.problems.contact import Stop
@@ -89,6 +90,16 @@ def default_label(i: int) -> str:
 
 
 @dataclass(frozen=True)
+class Label:
+    """Names of components, shortened."""
+
+    of: Callable[[int], str]
+
+    def __call__(self, i: int) -> str:
+        return shortened(self.of(i))
+
+
+@dataclass(frozen=True)
 class Parameters:
     """The vector p of length n_p: its starting point, the size of its natural changes, its bounds.
 
@@ -109,6 +120,10 @@ class Parameters:
     position: Array | None = None
 
     def __post_init__(self) -> None:
+        units = shortened(self.unit) if isinstance(self.unit, str) else tuple(map(shortened, self.unit))
+        object.__setattr__(self, "unit", units)
+        if not isinstance(self.label, Label):
+            object.__setattr__(self, "label", Label(self.label))
         for name in ("start", "scale"):  # an array of integers would truncate every step
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
         if self.start.ndim != 1 or self.scale.shape != self.start.shape or not (self.scale > 0).all():

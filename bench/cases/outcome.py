@@ -13,6 +13,7 @@ from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.cases.status import Status, one_line, reason_of, status_of
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 from gradient_routes.problems.problem import Array, Fields, ParameterView, Reference
+from gradient_routes.problems.text import shortened
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ class Record:
         self._new: Row = {}
 
     def add(self, values: Row) -> None:
-        """Columns that are known now."""
+        """Columns that are known now; texts of other people's code are shortened."""
+        values = {name: shortened(value) if isinstance(value, str) else value for name, value in values.items()}
         self.known |= values
         self._new |= values
 
@@ -79,7 +81,8 @@ class Record:
 
     def ended(self, status: Status, reason: str | None = None, **beside: Any) -> Outcome:
         """The outcome; `beside` are its fields but for the row."""
-        return Outcome(row_of(self.asked | self.known | {"status": status, "reason": reason}), **beside)
+        self.add({"status": status.value, "reason": reason})
+        return Outcome(row_of(self.asked | self.known), **beside)
 
     def failed(self, failure: BaseException, who: str, **beside: Any) -> Outcome:
         """The outcome of a case that raised `failure`: the reason in a sentence, the traceback."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 from gradient_routes.problems.errors import NotConverged, RoutesError
+from gradient_routes.problems.text import shortened
 
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
 EXHAUSTED = ("RESOURCE_EXHAUSTED", "out of memory", "not enough memory")  # what XLA and PARDISO say for MemoryError
@@ -59,7 +60,7 @@ def status_of(failure: BaseException) -> Status:
 
 def one_line(error: BaseException) -> str:
     """Its type and its text."""
-    said = " ".join(str(error).split())
+    said = " ".join(shortened(str(error)).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
 

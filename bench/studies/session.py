@@ -19,6 +19,7 @@ from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.job import ExitCode, Printed
 from gradient_routes.bench.units import now
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.text import shortened
 
 LOST = 1  # exit code where what was found could not be written
 
@@ -38,10 +39,12 @@ class Session:
         match message:
             case Kept(table, row, stored, beside):
                 if not stored:
+                    row = {name: shortened(value) if isinstance(value, str) else value for name, value in row.items()}
                     self.tables[table].append(row | beside)
                 if self.as_json and self.study.json is None:
                     self._print(as_json({"table": table, **row}) + "\n")
             case Note(text, result):
+                text = shortened(text)
                 if result and not self.as_json:
                     self._print(plain(text) + "\n")
                 else:

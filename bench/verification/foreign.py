@@ -13,6 +13,7 @@ from gradient_routes.bench.verification.held import without
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, default_label
+from gradient_routes.problems.text import shortened
 
 Bounds = Any  # (lower, upper), one pair a parameter, or scipy.optimize.Bounds
 DECADES = 1e3  # ratio of magnitudes that tell the scale of a parameter that starts at 0
@@ -155,7 +156,7 @@ def _vector(values: Any, n_p: int | None, what: str) -> Array:
 
 def _labels(names: Any, n_p: int) -> Callable[[int], str]:
     try:
-        given = [str(name) for name in names]
+        given = [shortened(str(name)) for name in names]
     except TypeError:
         raise InputError(f"check: names={names!r} - give one name for each parameter") from None
     if isinstance(names, str) or len(given) != n_p:

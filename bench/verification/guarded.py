@@ -12,6 +12,7 @@ import numpy as np
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array
+from gradient_routes.problems.text import shortened
 
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what user code may raise
 SINGLE, DOUBLE = (float(np.finfo(kind).eps) for kind in (np.float32, np.float64))
@@ -168,4 +169,4 @@ def detached(value: Any) -> Any:
 
 def one_line(failure: BaseException) -> str:
     """Type and message."""
-    return f"{type(failure).__name__}: {' '.join(str(failure).split())}"
+    return f"{type(failure).__name__}: {' '.join(shortened(str(failure)).split())}"

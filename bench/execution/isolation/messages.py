@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from gradient_routes.bench.cases.status import Status
+from gradient_routes.problems.text import shortened
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
@@ -77,6 +78,10 @@ class Ended:
     stderr: str = ""
     traceback: str = ""
     killed: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("reason", "traceback"):
+            object.__setattr__(self, name, shortened(getattr(self, name)))
 
     def line(self, who: str) -> str:
         """For the user: who, what happened, what to do."""
