@@ -12,6 +12,7 @@ import math
 import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -42,6 +43,7 @@ class Option:
         return f"{self.name}={'' if self.default is None else self.default}"
 
 
+@lru_cache(maxsize=256)  # a store may have 100 000 rows of a few factories
 def options_of(factory: Callable[..., Any]) -> dict[str, Option]:
     """The options `factory` declares: its keyword-only parameters, by name."""
     try:

@@ -69,15 +69,23 @@ def results(rows: Sequence[Row]) -> TextTable:
     """One row a case under the title of its problem."""
     table = TextTable(HEADINGS, NUMBERS)
     before = None
+    groups = _by_problem(rows)
     for row in rows:
         problem = titled(row)
         if problem != before:
-            table.title(_title(problem, [other for other in rows if titled(other) == problem]))
+            table.title(_title(problem, groups[problem]))
             before = problem
         style = "" if row["status"] == "ok" else "dim" if row["status"] in ANSWERED else "bold red"
         label = Text(named("route", row), style=style or route_style(row["route"]))
         table.row(label, [Text(cell, style=style) for cell in _cells(row)])
     return table
+
+
+def _by_problem(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(titled(row), []).append(row)
+    return groups
 
 
 def _title(problem: str, rows: Sequence[Row]) -> str:
@@ -124,8 +132,7 @@ def remarks(rows: Sequence[Row]) -> list[tuple[str, str]]:
 
 def _references(rows: Sequence[Row]) -> Iterator[tuple[str, str]]:
     """Errors measured against another reference than the title says."""
-    for problem in dict.fromkeys(map(titled, rows)):
-        group = [row for row in rows if titled(row) == problem]
+    for problem, group in _by_problem(rows).items():
         usual = _usual_reference(group)
         for row in group:
             if row["reference"] not in (usual, None):
