@@ -64,13 +64,13 @@ def changed(known: tuple[Stamp, ...]) -> str | None:
     return None
 
 
+@cache
 def _read(source: Source) -> tuple[str, tuple[Stamp, ...]]:
     if source.file is None:
         return hashlib.sha256(source.module.encode()).hexdigest(), ()
     return _digest(Path(source.file), source.module)
 
 
-@cache
 def _digest(path: Path, module: str) -> tuple[str, tuple[Stamp, ...]]:
     if not path.is_file():
         raise FileNotFoundError(path)

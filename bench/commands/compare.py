@@ -65,14 +65,17 @@ def compare(
     from gradient_routes.bench.cases import expected as expectations
     from gradient_routes.bench.regression.baseline import measured
     from gradient_routes.bench.regression.compare import compare as compare_sides
+    from gradient_routes.bench.store.cases import uncollected
     from gradient_routes.bench.store.output_files import Output
 
     known = expectations.beside(new) if expected is None else expectations.read(expected)
-    sides = measured(base), measured(new)
+    with uncollected():
+        sides = measured(base), measured(new)
     file = None if output is None else Output("compare -o", output, (".md", ".json", ".txt"))
     if file is not None:
         file.check([base, new, expected or new.parent / expectations.FILE])
-    found = compare_sides(*sides, known, factor, subset)
+    with uncollected():
+        found = compare_sides(*sides, known, factor, subset)
     _write(found, format or _format_of(output), file)
     raise click.exceptions.Exit(1 if found.worse else 0)
 

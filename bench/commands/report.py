@@ -52,11 +52,17 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
 def _print(store: Store) -> None:
     from gradient_routes.bench.cases.declared import undeclared
     from gradient_routes.bench.cases.order import in_order
-    from gradient_routes.bench.render.terminal.tables import console
+    from gradient_routes.bench.render.source import LIGHT, thinned
+    from gradient_routes.bench.render.terminal.tables import MOST, console
+    from gradient_routes.bench.store.cases import cases, numbered
     from gradient_routes.bench.studies.bill.view import show
 
-    rows = in_order(store.rows(), lambda row: row)
-    show(rows)
+    count = store.count()
+    rows = store.rows() if count <= MOST else [*numbered(store, thinned([*cases(store, LIGHT, parse=False)], MOST))]
+    show(in_order(rows, lambda row: row))
+    if count > len(rows):
+        said = f"{len(rows)} of {count} rows are shown, those of evenly spaced problems; `routes export` writes all"
+        console().print(said, style="dim", soft_wrap=True)
     if note := undeclared(rows):
         console().print(note, style="dim", soft_wrap=True)
     console().print(MORE, style="dim", soft_wrap=True)

@@ -38,14 +38,17 @@ def status(as_json: bool, store: Path) -> None:
     from gradient_routes.bench.cases.row import as_json as json_line
     from gradient_routes.bench.commands.status_view import matrix
     from gradient_routes.bench.render.terminal import tables
+    from gradient_routes.bench.store.cases import EVERY, uncollected
     from gradient_routes.bench.store.status import counts, standings
     from gradient_routes.bench.store.store import Store
 
-    found = standings(Store(store))
     if as_json:
+        found = standings(Store(store), EVERY)
         for each in found:
             click.echo(json_line(each.row | {"state": each.aged or "current"}))
         return
+    with uncollected():
+        found = standings(Store(store))
     out = tables.console()
     tables.show(out, matrix(found))
     out.print(counts(found), style="dim", soft_wrap=True)

@@ -6,7 +6,7 @@ from rich.text import Text
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.row import ANSWERED
-from gradient_routes.bench.render.terminal.tables import asked
+from gradient_routes.bench.render.terminal.tables import MOST, asked, ends, left_out
 from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.bench.store.status import Standing, counts
 
@@ -18,7 +18,13 @@ def matrix(standing: list[Standing]) -> TextTable:
         cells.setdefault(asked(each.row), {}).setdefault(each.row["route"], []).append(each)
     routes = sorted({each.row["route"] for each in standing}, key=registry.place)
     table = TextTable(["problem", *routes])
-    for problem, found in cells.items():
+    rows = [*cells.items()]
+    for k in ends(len(rows), MOST):
+        if k is None:
+            said = f"{left_out(len(rows), MOST)} problems; --json has all"
+            table.row(Text(said, style="dim"), [Text("")] * len(routes))
+            continue
+        problem, found = rows[k]
         table.row(Text(problem), [_cell(found.get(route, [])) for route in routes])
     return table
 

@@ -40,6 +40,11 @@ class Comparison:
         return {judgement: self.count(judgement) for judgement in JUDGEMENTS}
 
     @property
+    def cases(self) -> int:
+        """Number of cases of both sides."""
+        return sum(finding.metric == "status" for finding in self.findings)
+
+    @property
     def by_numbers(self) -> int:
         """Number of cases that are ok on both sides, so that numbers are compared."""
         return sum(f.metric == "status" and f.base == f.new == "ok" for f in self.findings)
@@ -150,9 +155,10 @@ def _any_worse(findings: Sequence[Finding]) -> bool:
 
 def _libraries(pairs: Sequence[Pair]) -> Iterator[str]:
     """Each difference once, with the number of cases; numbers are compared in any case."""
-    found = [tuple(library_differences(base, new)) for base, new in pairs]
-    for one in dict.fromkeys(filter(None, found)):
-        yield f"libraries differ in {found.count(one)} of {len(pairs)} cases: {'; '.join(one)}"
+    found = Counter(tuple(library_differences(base, new)) for base, new in pairs)
+    for one, count in found.items():
+        if one:
+            yield f"libraries differ in {count} of {len(pairs)} cases: {'; '.join(one)}"
 
 
 def _old(*sides: Measured) -> Iterator[str]:

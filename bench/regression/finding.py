@@ -11,7 +11,7 @@ Judgement = Literal["same", "better", "worse", "shown", "not-compared"]
 JUDGEMENTS: tuple[Judgement, ...] = ("worse", "better", "shown", "not-compared", "same")  # in the order of interest
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """`case` names problem and route; `base` and `new` are the values of the metric, None if absent; `says` is a
     sentence about them."""

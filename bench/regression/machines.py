@@ -13,6 +13,8 @@ LIBRARIES = ("python", "blas")
 
 def machine_differences(base: Case, new: Case) -> list[str]:
     """Differences of machine and threads: `cores 2 there, 8 here`."""
+    if base.environment == new.environment and base.row["threads"] == new.row["threads"]:
+        return []
     pairs = {name: (base.environment.get(name), new.environment.get(name)) for name in MACHINE}
     pairs["threads of the case"] = (base.row["threads"], new.row["threads"])
     return _differences(pairs)
@@ -20,6 +22,8 @@ def machine_differences(base: Case, new: Case) -> list[str]:
 
 def library_differences(base: Case, new: Case) -> list[str]:
     """Differences of versions."""
+    if base.environment == new.environment:
+        return []
     pairs = {name: (base.environment.get(name), new.environment.get(name)) for name in LIBRARIES}
     before, now = (case.environment.get("versions") or {} for case in (base, new))
     pairs |= {name: (before.get(name), now.get(name)) for name in sorted(before.keys() | now.keys())}

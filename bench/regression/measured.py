@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
-from gradient_routes.bench.cases.row import ENVIRONMENTS, from_record
+from gradient_routes.bench.cases.row import ENVIRONMENTS
+from gradient_routes.bench.store.cases import IDS, cases
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 
@@ -20,7 +21,7 @@ DECLARED = ("problem_declared", "route_declared")
 KEPT = ("case_key", *NAMES, *DECLARED, "settings", "status", "reason", *NUMBERS, *HOW)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Case:
     """The columns KEPT of a row, its environment and its times.
 
@@ -78,18 +79,18 @@ class Measured:
 
 def of_store(store: Store) -> Measured:
     """The latest cases and verdicts of a store. Raises InputError where there are none."""
-    cases, verdicts = _cases(store), _verdicts(store)
-    if not cases and not verdicts:
+    found, verdicts = _cases(store), _verdicts(store)
+    if not found and not verdicts:
         raise InputError(f"store {store.path}: holds no case and no verdict - run `routes run` first, or name another")
-    return Measured(str(store.path), tuple(cases), tuple(verdicts))
+    return Measured(str(store.path), tuple(found), tuple(verdicts))
 
 
 def _cases(store: Store) -> list[Case]:
     environments, latest = _environments(store), {}
-    for record in store.records("cases"):
-        row = from_record(record)
-        case = Case({name: row[name] for name in KEPT}, environments.get(record["environment_id"], {}))
-        latest[case.key] = record["case_id"], case
+    for row in cases(store, (*KEPT, *IDS)):
+        case_id, environment = row.pop("case_id"), environments.get(row.pop("environment_id"), {})
+        case = Case(row, environment)
+        latest[case.key] = case_id, case
     times = _times(store, {case_id for case_id, _ in latest.values()})
     return [Case(case.row, case.environment, *times.get(case_id, ())) for case_id, case in latest.values()]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from typing import Any
 
 from gradient_routes.bench.cases.row import clean
@@ -11,6 +12,7 @@ from gradient_routes.bench.regression.finding import Finding
 from gradient_routes.bench.regression.view import LEGEND, METRICS, cell, conclusion, lines, names, overview
 from gradient_routes.bench.sanitize import plain
 
+FIELDS = [field.name for field in fields(Finding) if field.name != "case"]
 SIGNS = {"worse": "❌", "better": "✅", "shown": "•", "not-compared": "◌"}
 
 
@@ -62,4 +64,4 @@ def as_json(comparison: Comparison) -> str:
 def _finding(finding: Finding) -> dict[str, Any]:
     problem, route = names(finding.case)
     named = {"problem": problem, "route": route, "at": finding.case["at"]}
-    return named | {name: value for name, value in vars(finding).items() if name != "case"}
+    return named | {name: getattr(finding, name) for name in FIELDS}

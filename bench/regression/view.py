@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 from rich.console import Console
@@ -14,7 +15,7 @@ from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.regression.compare import Comparison
 from gradient_routes.bench.regression.finding import JUDGEMENTS, Finding, Judgement
 from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
-from gradient_routes.bench.render.terminal.tables import RESOLUTION, named, say, show, titled
+from gradient_routes.bench.render.terminal.tables import MOST, RESOLUTION, named, say, show, titled
 from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.routes.tally import Work
 
@@ -39,6 +40,8 @@ def show_comparison(out: Console, comparison: Comparison) -> None:
     cases = overview(comparison)
     if cases:
         show(out, _table(cases))
+        if (every := comparison.cases) > len(cases):
+            say(out, f"{len(cases)} of {every} cases, those that changed first; --format json has all", "dim")
         say(out, LEGEND, "dim")
     for judgement, line in lines(comparison):
         say(out, line, STYLES.get(judgement, ""))
@@ -59,13 +62,19 @@ def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> TextTable:
 
 
 def overview(comparison: Comparison) -> list[tuple[str, str, dict[str, Finding]]]:
-    """Problem, route and findings by metric of every case of both sides."""
+    """Problem, route and findings by metric of every case of both sides; of many, first those that changed."""
     grouped: defaultdict[int, dict[str, Finding]] = defaultdict(dict)
     for finding in comparison.findings:
         if finding.metric in METRICS:
             grouped[id(finding.case)][finding.metric] = finding
-    cases = (next(iter(by_metric.values())).case for by_metric in grouped.values())
-    return [(*names(case), by_metric) for case, by_metric in zip(cases, grouped.values(), strict=True)]
+    shown = [*grouped.values()]
+    if len(shown) > MOST:
+        shown = sorted(shown, key=lambda by_metric: not any(map(changed, by_metric.values())))[:MOST]
+    return [(*names(next(iter(by_metric.values())).case), by_metric) for by_metric in shown]
+
+
+def changed(finding: Finding) -> bool:
+    return finding.judgement in ("worse", "better")
 
 
 def names(case: Row) -> tuple[str, str]:
@@ -97,6 +106,14 @@ def _value(metric: str, value: Any) -> str:
 
 
 def lines(comparison: Comparison) -> Iterator[tuple[Judgement, str]]:
+    """A sentence per finding, the worse ones first; cases with the same sentence share it. Of many, the first."""
+    said = every_line(comparison)
+    yield from islice(said, MOST)
+    if left := sum(1 for _ in said):
+        yield "shown", f"... {left} more sentences; --format json has all"
+
+
+def every_line(comparison: Comparison) -> Iterator[tuple[Judgement, str]]:
     """A sentence per finding, the worse ones first; cases with the same sentence share it."""
     for judgement in JUDGEMENTS:
         shared: defaultdict[str, list[Finding]] = defaultdict(list)
@@ -110,8 +127,9 @@ def lines(comparison: Comparison) -> Iterator[tuple[Judgement, str]]:
 def _whose(findings: Sequence[Finding]) -> str:
     if len(findings) > FEW and findings[0].judgement != "worse":
         return f"{len(findings)} cases"
-    whose = (names(finding.case) for finding in findings)
-    return ", ".join(f"{route} on {problem}" if route else problem for problem, route in whose)
+    whose = [names(finding.case) for finding in findings[:MOST]]
+    more = f" and {len(findings) - MOST} more" if len(findings) > MOST else ""
+    return ", ".join(f"{route} on {problem}" if route else problem for problem, route in whose) + more
 
 
 def conclusion(comparison: Comparison) -> str:

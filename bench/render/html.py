@@ -19,6 +19,7 @@ from gradient_routes.bench.render.vega import FIRST, guides, overlaps, panels, s
 from gradient_routes.bench.render.view import View
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
+ROWS = 1000  # of a table that is written out
 SELECTOR = re.compile(r"[^\[,]+(\[[^\]]*\])?")  # a problem without the settings of its run
 FOOTER = (
     "Point at a mark to read its numbers; click a name in a legend to see its curves alone, and beside it to see all"
@@ -148,11 +149,12 @@ def _table(figure: Figure) -> str:
         words = _verdict(row[k] or "") if column.name == "verdict" else escape(shown(column, row[k]))
         return f"<td{kind}>{words}"
 
-    body = "".join(f"<tr>{''.join(cell(row, *column) for column in columns)}" for row in table.rows)
+    body = "".join(f"<tr>{''.join(cell(row, *column) for column in columns)}" for row in table.rows[:ROWS])
+    more = f"<p>{left} more rows: `routes export` writes all.</p>" if (left := len(table.rows) - ROWS) > 0 else ""
     label = escape(f"Numbers of {figure.title}")
     return (
         f'<div class=scroll tabindex=0 role=region aria-label="{label}">'
-        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{more}"
     )
 
 

@@ -16,17 +16,20 @@ from gradient_routes.bench.render.source import Source, schema
 
 def section(source: Source) -> Section:
     cases = source.cases
-    counted = Counter(row["status"] for row in cases)
+    counts = source.counts
     of_studies = Counter(row["study"] for row in source.studies if row["status"] == "ok")
     facts = (
-        (str(len(cases)), f"{_plural(len(cases), 'case')}: " + ", ".join(_counts(counted)) if cases else "cases"),
-        (str(len({row["problem"] for row in cases})), "problems, options apart"),
-        (str(len({row["by"] for row in cases})), "routes"),
+        (
+            str(counts.cases),
+            f"{_plural(counts.cases, 'case')}: " + ", ".join(_counts(counts.status)) if cases else "cases",
+        ),
+        (str(counts.problems), "problems, options apart"),
+        (str(counts.routes), "routes"),
         (str(sum(of_studies.values())), "studies" + _listed(of_studies)),
         (str(len(source.environments)), _plural(len(source.environments), "environment")),
     )
-    newest = "" if source.kept == len(cases) else f"The newest of {source.kept} runs of {len(cases)} cases."
-    says = " ".join(filter(None, (newest, source.note and f"{source.note}.")))
+    newest = "" if source.kept == counts.cases else f"The newest of {source.kept} runs of {counts.cases} cases."
+    says = " ".join(filter(None, (newest, source.thinned, source.note and f"{source.note}.")))
     figures = (matrix(cases),) if cases else ()
     return Section("overview", "At a glance", says, figures, facts)
 
@@ -80,9 +83,9 @@ def failures(source: Source) -> Section | None:
         return None
     figures = []
     if rows:
-        counted = ", ".join(_counts(Counter(row["status"] for row in rows)))
+        counted = ", ".join(_counts(source.counts.status - Counter({"ok": source.counts.cases})))
         table = tabulate("cases", rows, "problem route status reason predicted_s budget_s timeout_s host started")
-        figures.append(Figure("failures", "Cases without a gradient", f"{counted}.", table))
+        figures.append(Figure("failures", "Cases without a gradient", f"{counted}. {source.thinned}".rstrip(), table))
     if ended:
         says = f"{len(ended)} ended before they were done."
         table = tabulate("studies", ended, "study status reason started")
@@ -111,7 +114,7 @@ def _spoken(words: tuple[tuple[str, str], ...]) -> tuple[tuple[str, str], ...]:
 def environments(source: Source) -> Section | None:
     if not source.environments:
         return None
-    ran = Counter(row["environment_id"] for row in source.cases)
+    ran = source.counts.environments
     rows = [
         row
         | {name: ", ".join(f"{k} {v}" for k, v in (row[name] or {}).items() if v) for name in ("threads", "versions")}

@@ -3,19 +3,58 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import selector_of
 from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.declared import kinds_of, undeclared
 from gradient_routes.bench.cases.registry import Kind
-from gradient_routes.bench.cases.row import COLUMNS, from_record
+from gradient_routes.bench.cases.row import COLUMNS
 from gradient_routes.bench.render.terminal.tables import asked
+from gradient_routes.bench.store.cases import IDS, cases, numbered
 from gradient_routes.bench.store.schema import tables as schema_tables
 from gradient_routes.bench.store.store import Store
+
+MOST = 2000  # cases that figures and tables show
+ASKING = ("problem_options", "settings", "at", "partial")
+LIGHT = (
+    *IDS,
+    "case_key",
+    "problem",
+    *ASKING,
+    "problem_declared",
+    "route",
+    "route_options",
+    "route_declared",
+    "status",
+)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many cases, problems and routes there are, and cases by status and by environment."""
+
+    cases: int = 0
+    problems: int = 0
+    routes: int = 0
+    status: Counter[str] = field(default_factory=Counter)
+    environments: Counter[str] = field(default_factory=Counter)
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> Counts:
+        """Of rows whose objects are text."""
+        return cls(
+            len(rows),
+            len({tuple(row[name] for name in ("problem", *ASKING)) for row in rows}),
+            len({row["route"] for row in rows}),
+            Counter(row["status"] for row in rows),
+            Counter(row["environment_id"] for row in rows),
+        )
 
 
 @dataclass(frozen=True)
@@ -31,6 +70,17 @@ class Source:
     tables: dict[str, list[Row]] = field(default_factory=dict)
     name: str = ""
     note: str = ""
+    counts: Counts = field(default_factory=lambda: Counts())
+
+    @property
+    def thinned(self) -> str:
+        """What is left out of figures and tables, in a sentence."""
+        if self.counts.cases <= len(self.cases):
+            return ""
+        return (
+            f"{len(self.cases)} of {self.counts.cases} cases are shown, those of evenly spaced problems;"
+            " `routes export` writes all."
+        )
 
     def table(self, name: str) -> list[Row]:
         """The rows of a study's table; none where this store has no such table."""
@@ -43,26 +93,35 @@ class Source:
 
 def read(store: Store) -> Source:
     """Everything a report shows. Raises InputError where there is no store."""
-    cases = cases_of(store)
+    every = [*{row["case_key"] or _unkeyed(row): row for row in cases(store, LIGHT, parse=False)}.values()]
+    shown = latest([*numbered(store, thinned(every))])
     declared = registry.study_tables()
     found = {name: newest(store.records(name), table.question) for name, table in declared.items()}
     named = {name: [_named(row, declared[name].columns) for row in rows] for name, rows in found.items()}
     return Source(
-        cases=latest(cases),
-        kept=len(cases),
+        cases=shown,
+        kept=store.count(),
         environments=store.records("environments"),
         studies=store.records("studies"),
         tables=named,
         name=store.path.name,
-        note=undeclared(cases),
+        note=undeclared(every),
+        counts=Counts.of(every),
     )
 
 
-def cases_of(store: Store) -> list[Row]:
-    """The cases, with the numbers of their rows and of their environments."""
-    return [
-        from_record(row) | {key: row[key] for key in ("case_id", "environment_id")} for row in store.records("cases")
-    ]
+def thinned(rows: Sequence[Row], most: int = MOST) -> list[int]:
+    """case_ids of at most `most` rows: all of them, or those of evenly spaced problems, each with all its routes."""
+    if len(rows) <= most:
+        return [row["case_id"] for row in rows]
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in ("problem", *ASKING)), []).append(row["case_id"])
+    step, ids = 0, list[int]()
+    while step < len(groups) and not 0 < len(ids) <= most:
+        step = max(step + 1, len(rows) // most)
+        ids = [case_id for group in [*groups.values()][::step] for case_id in group]
+    return ids[:: -(-len(ids) // most)]
 
 
 def latest(cases: Sequence[Row]) -> list[Row]:
@@ -87,9 +146,6 @@ def latest(cases: Sequence[Row]) -> list[Row]:
         | {"by": row["route"], "route": selector("route", row)}
         for row in newest.values()
     ]
-
-
-ASKING = ("problem_options", "settings", "at", "partial")
 
 
 def _unkeyed(row: Row) -> str:

@@ -33,7 +33,7 @@ def report(store: Store, output: Path | None, format: str | None, folder: Path |
     if format is not None:
         text = _text(source, made, format, output, folder, drawn)
         _write(file, text.encode("utf-8", "backslashreplace"))
-        said += [] if file is None else [f"report of {len(source.cases)} cases in {output}"]
+        said += [] if file is None else [f"report of {source.counts.cases} cases in {output}"]
     return said
 
 

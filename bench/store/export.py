@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import sys
+from collections.abc import Iterator, Sequence
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from gradient_routes.bench.store.schema import tables
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 
+AT_ONCE = 1000  # rows
 SUFFIXES = (".csv", ".json", ".parquet")
 
 
@@ -23,26 +26,48 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
     """Write a table of the store as CSV, Parquet or a JSON array of row objects, to a file or to stdout."""
     if table not in tables():
         raise InputError(f"export: no table '{table}' - {did_you_mean(table, tables())}")
-    names, records = store.table(table)
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
     file = None if output is None else Output("export -o", output, SUFFIXES)
     if file is not None:
         file.check([store.path])
-    if format == "json":
-        rows = [dict(zip(names, record, strict=True)) for record in records]
-        content = (json.dumps(rows, allow_nan=False) + "\n").encode()
-    elif format == "parquet":
-        content = _parquet(table, names, records)
-    else:
-        text = io.StringIO(newline="")
-        csv.writer(text, lineterminator="\n").writerows([names, *records])
-        content = text.getvalue().encode()
+    if format == "parquet":
+        _write(file, iter([_parquet(table, *store.table(table))]))
+        return
+    with store.streamed(table) as (names, records):
+        _write(file, (_json if format == "json" else _csv)(names, records))
+
+
+def _write(file: Output | None, pieces: Iterator[bytes]) -> None:
     if file is None:
-        print_bytes(content)
+        for piece in pieces:
+            print_bytes(piece)
         return
     with file.open() as target:
-        target.write(content)
+        target.writelines(pieces)
+
+
+def _json(names: list[str], records: Iterator[tuple[Any, ...]]) -> Iterator[bytes]:
+    """An array of objects."""
+    before = "["
+    for some in batched(records):
+        rows = (json.dumps(dict(zip(names, record, strict=True)), allow_nan=False) for record in some)
+        yield f"{before}{', '.join(rows)}".encode()
+        before = ", "
+    yield b"[]\n" if before == "[" else b"]\n"
+
+
+def _csv(names: list[str], records: Iterator[tuple[Any, ...]]) -> Iterator[bytes]:
+    heading: list[Sequence[Any]] = [names]
+    for some in chain([heading], batched(records)):
+        text = io.StringIO(newline="")
+        csv.writer(text, lineterminator="\n").writerows(some)
+        yield text.getvalue().encode()
+
+
+def batched(records: Iterator[tuple[Any, ...]]) -> Iterator[Sequence[Sequence[Any]]]:
+    while some := [*islice(records, AT_ONCE)]:
+        yield some
 
 
 def _parquet(table: str, names: list[str], records: list[tuple[Any, ...]]) -> bytes:

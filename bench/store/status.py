@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Row
@@ -11,9 +13,14 @@ from gradient_routes.bench.cases.declared import source_of
 from gradient_routes.bench.cases.imported import is_reference
 from gradient_routes.bench.cases.keys import content_key_of
 from gradient_routes.bench.cases.sources import Source, source
+from gradient_routes.bench.store.cases import cases
 from gradient_routes.bench.store.store import Store
 from gradient_routes.problems.errors import InputError
 
+SHOWN = (
+    *("problem", "problem_options", "problem_declared", "route", "route_options", "route_declared"),
+    *("at", "partial", "settings", "status", "case_key", "content_key"),
+)
 STALE, GONE, UNCHECKED = "stale", "gone", "unchecked"
 
 
@@ -32,13 +39,15 @@ class Standing:
         return self.row["status"] if self.aged is None else f"{self.row['status']} ({self.aged})"
 
 
-def standings(store: Store) -> list[Standing]:
-    """Of all cases, oldest first. Raises InputError where there is no store or none with keys."""
-    rows = list(store.latest().values())
-    if not rows:
-        store.rows()  # says so where there is no store
+def standings(store: Store, columns: Sequence[str] = SHOWN) -> list[Standing]:
+    """Of all cases with these columns, in the order in which they were first seen.
+
+    Raises InputError where there is no store or none with keys.
+    """
+    found = [Standing(row, _aged(row)) for row in cases(store, columns) if row["case_key"]]
+    if not found:
         raise InputError(f"store {store.path}: holds no case with a key - run `routes run` first, or name another")
-    return [Standing(row, _aged(row)) for row in rows]
+    return found
 
 
 def _aged(row: Row) -> str | None:
@@ -56,7 +65,19 @@ def _source(kind: registry.Kind, row: Row) -> Source | None:
     """Where the code of a row is now, None where the row does not say; code that the row names is not run."""
     if is_reference(row[kind]):
         return source_of(row[f"{kind}_declared"])
-    return source(registry.find(kind, row[kind]).load())
+    found = _registered(kind, row[kind])
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+@cache
+def _registered(kind: registry.Kind, name: str) -> Source | InputError:
+    """Of a registered problem or route, or why there is none: names are few, their rows many."""
+    try:
+        return source(registry.find(kind, name).load())
+    except InputError as error:
+        return error
 
 
 def counts(standing: list[Standing]) -> str:

@@ -126,11 +126,18 @@ class Store:
 
     def table(self, name: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Column names and rows of a table, oldest first. Raises InputError where there is no store."""
-        with self._reading() as db:
+        with self.streamed(name) as (names, records):
+            return names, [*records]
+
+    @contextmanager
+    def streamed(self, name: str) -> Iterator[tuple[list[str], Iterator[tuple[Any, ...]]]]:
+        """The same, the rows one at a time."""
+        with self.reading() as db:
             if not db.execute("SELECT count(*) FROM sqlite_master WHERE name = ?", (name,)).fetchone()[0]:
-                return [c.name for c in tables()[name]], []  # a store of an older schema
+                yield [c.name for c in tables()[name]], iter(())  # a store of an older schema
+                return
             cursor = db.execute(f'SELECT * FROM "{name}" ORDER BY rowid')
-            return [d[0] for d in cursor.description], cursor.fetchall()
+            yield [d[0] for d in cursor.description], cursor
 
     def records(self, name: str) -> list[Row]:
         """The rows of a table by column, objects parsed, columns of a newer schema absent. Raises InputError where a
@@ -154,9 +161,14 @@ class Store:
                     ) from error
         return row
 
+    def count(self) -> int:
+        """Of all runs of cases. Raises InputError where there is no store."""
+        with self.reading() as db:
+            return int(db.execute("SELECT count(*) FROM cases").fetchone()[0])
+
     def names(self) -> set[str]:
         """Of its tables. Raises InputError where there is no store."""
-        with self._reading() as db:
+        with self.reading() as db:
             return {name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
 
     def cases(self) -> DataFrame:
@@ -202,7 +214,7 @@ class Store:
         """What a query of keys finds; nothing where there is no store yet, or one from before there were keys."""
         if not self.file.is_file() or self.file.stat().st_size == 0:
             return []
-        with self._reading() as db:
+        with self.reading() as db:
             if "case_key" not in {column[1] for column in db.execute("PRAGMA table_info(cases)")}:
                 return []  # of an older schema
             cursor = db.execute(query, {"case_key": case_key})
@@ -210,7 +222,7 @@ class Store:
             return [dict(zip(names, record, strict=True)) for record in cursor]
 
     @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
+    def reading(self) -> Iterator[sqlite3.Connection]:
         with self._errors():
             if not self.file.is_file():
                 raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")

@@ -21,6 +21,7 @@ PIPED_WIDTH = 160  # columns where there is no terminal to ask
 DEFAULTS = vars(Settings().solver)
 RESOLUTION = 2**20  # bytes; smaller peaks are noise of allocators and the interpreter
 LONGEST = 64  # lines; of longer lists the first and the last are shown
+MOST = 1000  # rows of a table of cases
 
 
 def console(stderr: bool = False) -> Console:
@@ -97,12 +98,12 @@ def asked(row: Row) -> str:
     return ", ".join([titled(row), *unusual])
 
 
-def ends(n: int) -> list[int | None]:
+def ends(n: int, most: int = LONGEST) -> list[int | None]:
     """Indices of the lines to show of n, None where some are left out."""
-    half = LONGEST // 2
-    return [*range(n)] if n <= LONGEST else [*range(half), None, *range(n - half, n)]
+    half = most // 2
+    return [*range(n)] if n <= most else [*range(half), None, *range(n - half, n)]
 
 
-def left_out(n: int) -> str:
+def left_out(n: int, most: int = LONGEST) -> str:
     """What stands in place of the lines left out."""
-    return f"... {n - LONGEST} more"
+    return f"... {n - most} more"

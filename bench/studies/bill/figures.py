@@ -46,6 +46,7 @@ def section(source: Source) -> Section | None:
         return None
     figures = (error_and_time(rows), memory_and_time(rows), work(rows), prediction(rows))
     says = "What one gradient costs by every route, and how wrong it is. The newest run of every case."
+    says = f"{says} {source.thinned}".rstrip()
     return Section("bill", "The bill of routes", says, tuple(f for f in figures if f is not None))
 
 

@@ -26,6 +26,7 @@ def section(source: Source) -> Section | None:
     )
     drawn = tuple(f for f in figures if f is not None)
     says = "The same problem at several sizes. Both axes are logarithmic: a slope is an exponent."
+    says = f"{says} {source.thinned}".rstrip()
     return Section("scaling", "Scaling", says, drawn) if drawn else None
 
 
