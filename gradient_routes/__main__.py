@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gradient_routes.bench.cli import main
+from gradient_routes.bench.start import main
 
 if __name__ == "__main__":
-    main(prog_name="routes")
+    main()

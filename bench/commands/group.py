@@ -6,12 +6,14 @@ import io
 import os
 import sys
 import traceback
+from contextlib import suppress
 from typing import Any, NoReturn
 
 import click
 
 from gradient_routes.bench.cases.folder import from_here
 from gradient_routes.bench.command_options import FINISHED, complain, debugging
+from gradient_routes.bench.commands.interrupts import catching, over
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
@@ -34,9 +36,11 @@ class Routes(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         prepare_streams()
         try:
+            catching()
             with from_here():
                 return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
+            over()
             kept = FINISHED if ctx.invoked_subcommand == "run" else "nothing is kept"  # studies say so themselves
             complain(f"interrupted - {kept}{' '.join(map(str, interrupt.args))}")
             leave(INTERRUPTED)
@@ -73,11 +77,13 @@ def code(failure: BaseException, command: str | None) -> int:
 
 
 def leave(code: int) -> NoReturn:
-    """Exit at once: threads of XLA that compile cannot be waited for, and crash at an orderly exit."""
-    own_process = sys.stdout is sys.__stdout__
-    if own_process and "jax" in sys.modules:
-        sys.stdout.flush()
-        sys.stderr.flush()
+    """Exit at once: threads of XLA that compile cannot be waited for, and crash at an orderly exit; and Python ends
+    itself by SIGINT where one came while it imported an extension.
+    """
+    if sys.stdout is sys.__stdout__:  # its own process
+        for stream in filter(None, (sys.stdout, sys.stderr)):
+            with suppress(OSError):
+                stream.flush()
         os._exit(code)
     sys.exit(code)
 

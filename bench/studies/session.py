@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -28,6 +29,7 @@ class Session:
     """One call of a study. A store that cannot be written is refused now, before anything is measured."""
 
     def __init__(self, study: Study, kept: Path | None, as_json: bool) -> None:
+        self._pid = os.getpid()
         self.study, self.as_json, self.started = study, as_json, now()
         self.store = None if kept is None else Store(kept)
         self.tables: dict[str, list[Row]] = {name: [] for name in study.tables}
@@ -58,6 +60,8 @@ class Session:
 
     def close(self) -> int:
         """Keep the rows and how the study ended, say so where it did not end well; the exit code."""
+        if os.getpid() != self._pid:  # a copy that user code has forked in this process: one study is stored once
+            os._exit(1)
         end, rows = self.end, any(self.tables.values())
         well = end.status is Status.OK
         if self.store is not None and (rows or end.status.todo):  # `todo`: it was ended, or lost

@@ -106,8 +106,8 @@ class Isolated:
         """What was known when it died is kept."""
         error, status = self._record.known.get("gradient_error"), end.status
         reason = end.reason
-        if status in (Status.OK, Status.INTERRUPTED):
-            status, reason = Status.CRASHED, "its process was told to end"
+        if status is Status.OK:
+            status, reason = Status.CRASHED, "its process ended before the case did"
         known = "" if error is None else f"; its gradient was known by then, its error {error:.2g}"
         where = f"{self._phase}{located(end.stderr)}"
         self._record.add({"traceback": end.traceback or None})

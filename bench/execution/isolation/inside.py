@@ -9,6 +9,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from gradient_routes.bench.execution.isolation.descendants import adopt
 from gradient_routes.bench.execution.isolation.limits import Limits
 
 PR_SET_PDEATHSIG = 1  # of Linux' prctl
@@ -25,6 +26,7 @@ def submit_to(limits: Limits, parent: int) -> None:
             os._exit(1)  # the parent ended before prctl was called
         with suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
+    adopt()
     if limits.memory is not None and os.name == "posix":
         import resource
 

@@ -15,6 +15,7 @@ from typing import IO, Any
 import psutil
 
 from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.execution.isolation import descendants
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.execution.isolation.stack import ASKED, without
@@ -43,8 +44,8 @@ class Confined:
     """`python -P -m MODULE ARGUMENTS` under limits.
 
     watch(until, deadline) waits; kill() ends it and its descendants; `stderr` holds its last lines. `last_words` is a
-    signal that is sent at the deadline, and the seconds until the process is killed. A daemon, which has left the
-    process group and has lost its parent, is not reached.
+    signal that is sent at the deadline, and the seconds until the process is killed. Where there is no /proc, a daemon,
+    which has left the process group and has lost its parent, is not reached.
     """
 
     def __init__(
@@ -59,11 +60,12 @@ class Confined:
     ) -> None:
         self.limits = limits
         self._oom_kills = _oom_kills()
+        self._mark = descendants.new_mark()
         self._killing, self._killed = threading.RLock(), False
         self._talkative, self._stderr, self._last_words = talkative, bytearray(), last_words
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", module, *arguments],
-            env={**os.environ, **limits.environment},
+            env={**os.environ, **limits.environment, descendants.MARK: self._mark},
             stderr=subprocess.PIPE,
             start_new_session=True,
             **popen,
@@ -108,11 +110,11 @@ class Confined:
         return self.process.poll() is not None
 
     def kill(self) -> None:
-        """Send SIGKILL to the group and to descendants that left it; once, since the system may reuse its number."""
+        """Send SIGKILL to the group and to all descendants; once, since the system may reuse its number."""
         with self._killing:
             if self._killed:
                 return
-            strays = self._descendants()
+            strays = descendants.of(self.process.pid)
             with suppress(OSError):
                 if os.name == "posix":
                     os.killpg(self.process.pid, signal.SIGKILL)
@@ -122,6 +124,7 @@ class Confined:
                 with suppress(psutil.Error):
                     stray.kill()
             self.process.wait()
+            descendants.kill_marked(self._mark)
             self._killed = True
         self._pump.join(1.0)
 
@@ -159,16 +162,10 @@ class Confined:
                         sys.stderr.write(piece.decode(errors="backslashreplace"))
                         sys.stderr.flush()
 
-    def _descendants(self) -> list[psutil.Process]:
-        try:
-            return list(psutil.Process(self.process.pid).children(recursive=True))
-        except psutil.Error:
-            return []
-
     def _memory(self) -> int:
         """Resident bytes of the process and its descendants."""
         total = 0
-        for process in (psutil.Process(self.process.pid), *self._descendants()):
+        for process in (psutil.Process(self.process.pid), *descendants.of(self.process.pid)):
             with suppress(psutil.Error):
                 total += process.memory_info().rss
         return total

@@ -10,13 +10,16 @@ import os
 import pickle
 import signal
 import sys
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
 from gradient_routes.bench.cases.folder import from_here
+from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.channel import SAID, Channel, ended
 from gradient_routes.bench.execution.isolation.inside import submit_to
+from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.execution.isolation.signals import STOPS
 from gradient_routes.bench.execution.isolation.stack import told
 
@@ -28,13 +31,14 @@ class Stop:
     """
 
     def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+        self._connection, self._pid = connection, os.getpid()
         self._told = self._sending = self._waiting = False
+        self.signal: signal.Signals | None = None
         for number in STOPS:
             signal.signal(number, self._handle)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)  # the parent blocked them: none came before the handlers
 
     def send(self, message: Any) -> None:
+        self._end_copy()
         self._sending = True
         try:
             self._connection.send((SAID, message))
@@ -46,13 +50,19 @@ class Stop:
 
     def send_last(self, message: Any) -> None:
         """Send a message that no signal interrupts."""
+        self._end_copy()
         self._told = True
         self._connection.send((SAID, message))
+
+    def _end_copy(self) -> None:
+        """A copy that user code has forked says nothing: every message is that of one process."""
+        if os.getpid() != self._pid:
+            os._exit(1)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self._told:
             return
-        self._told = True
+        self._told, self.signal = True, signal.Signals(number)
         if not self._sending:
             raise KeyboardInterrupt
         self._waiting = True
@@ -82,8 +92,15 @@ def main(descriptor: int) -> None:
     limits, parent, sys.path[:] = connection.recv()
     submit_to(limits, parent)
     stop = Stop(connection)
-    with from_here():
-        stop.send_last(ended(Sent(connection.recv_bytes()), Channel(stop.send, connection.recv)))
+    try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)  # the parent blocked them: none came before the handlers
+        with from_here():
+            end = ended(Sent(connection.recv_bytes()), Channel(stop.send, connection.recv))
+    except KeyboardInterrupt:  # before it has begun
+        end = Ended(Status.INTERRUPTED)
+    if end.status is Status.INTERRUPTED:  # who sent the signal is for the parent to say
+        end = replace(end, reason="KeyboardInterrupt" if stop.signal is None else stop.signal.name)
+    stop.send_last(end)
     sys.stderr.flush()
     os._exit(0)  # skip exit handlers of plug-ins and XLA
 

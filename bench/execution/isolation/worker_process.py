@@ -40,6 +40,13 @@ class Loaded(pickle.Unpickler):
         return super().find_class(module, name)
 
 
+def unsolicited(end: Ended) -> Ended:
+    """The end of a job that nobody here has interrupted: its own code has sent the signal, or another process."""
+    if end.status is not Status.INTERRUPTED:
+        return end
+    return replace(end, status=Status.CRASHED, reason=f"its process was told to end by {end.reason}")
+
+
 class WorkerProcess:
     """A worker that does a job, and its messages, read by a thread so that an incomplete message blocks nothing else.
 
@@ -85,7 +92,7 @@ class WorkerProcess:
                 self._left -= time.monotonic() - start
         if self._ended is None:
             if isinstance(self._message, Ended):
-                self._ended = self._message
+                self._ended = unsolicited(self._message)
             elif self._message is None:
                 self._ended = self.process.ending()
             else:

@@ -200,12 +200,11 @@ def test_a_process_is_killed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     process.kill()
 
 
-def test_a_daemon_stops_nobody(started: Shell) -> None:
-    """It has left group and parent, and is out of reach; that it holds the lines open must not matter."""
+def test_a_daemon_stops_nobody_and_is_ended(started: Shell) -> None:
+    """It has left group and parent, and holds the lines open."""
     ran = started.run("run", "--json", "--problem", faulty(does="daemonize"), "--route", "fd-central")
     assert [row["status"] for row in ran.rows] == ["ok"]
-    (daemon,) = started.alive()
-    daemon.kill()
+    started.nothing_is_left()
 
 
 def test_libraries_use_as_many_threads_as_they_may(started: Shell) -> None:
