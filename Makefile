@@ -76,6 +76,7 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.harness
 	$(BIN)/python -m benchmarks.repeat
 	$(BIN)/python -m benchmarks.reporting
+	$(BIN)/python -m benchmarks.large
 	$(BIN)/python -m benchmarks.killing
 
 mutants: $(READY) ## 60 small faults in problems, routes and the judge: do the tests fail? (hours)

@@ -173,7 +173,7 @@ def run(
         if failed:
             complain("; ".join(failed))
     if resume or only:
-        complain(f"{len(done.outcomes)} of {count} cases run, the others left as they are")
+        complain(f"{done.count} of {count} cases run, the others left as they are")
     if failed:
         raise click.exceptions.Exit(1)
     if debugging():

@@ -19,27 +19,41 @@ if TYPE_CHECKING:
     from gradient_routes.bench.cases.outcome import Outcome
     from gradient_routes.bench.store.store import Store
 
+MOST = 1000
+
 
 class Done:
-    """Outcomes so far, without what only the store needs; `failed` says what could not be stored or printed."""
+    """Outcomes so far, without what only the store needs; `failed` says what could not be stored or printed.
+
+    Of many, the first and those that failed are kept, MOST of each: memory does not grow with a sweep. `count` is of
+    all of them, `failures` of those that failed and were not expected to.
+    """
 
     def __init__(self, store: Store | None, as_json: bool, known: Sequence[Expectation], views: bool) -> None:
         self.store, self.as_json, self.known, self._views = store, as_json, known, views
         self.outcomes: list[Outcome] = []
         self.failed: list[str] = []
+        self.count = self.failures = 0
         self._keeper = Keeper(store)
         self._waiting: dict[int, Row] = {}  # by place: rows that are not printed yet
         self._next = 0
 
     def take(self, outcome: Outcome) -> None:
         """Store a row at once; print it, as JSON, as soon as all rows before it are printed."""
+        from gradient_routes.bench.cases.expected import as_expected
+        from gradient_routes.bench.cases.row import ANSWERED
+
         self._keeper.append(outcome.row, outcome.samples, outcome.environment)
-        slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
-        self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
         self._waiting[outcome.place] = outcome.row
         while self._next in self._waiting:
             self._print(self._next)
             self._next += 1
+        self.count += 1
+        failed = outcome.row["status"] not in ANSWERED
+        self.failures += failed and not as_expected(outcome.row, self.known)
+        if len(self.outcomes) < (2 * MOST if failed else MOST) or self._views:
+            slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
+            self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
 
     def _print(self, place: int) -> None:
         from gradient_routes.bench.cases.row import as_json
@@ -65,6 +79,8 @@ class Done:
         kept = None if self.store is None or apart else self.store.path
         with self._printing():
             show([o.row for o in self.ordered], views, kept, self.known)
+            if self.count > len(self.outcomes):
+                click.echo(f"{len(self.outcomes)} of {self.count} cases are shown; `routes export` writes all")
 
     @contextmanager
     def _printing(self) -> Iterator[None]:
@@ -81,12 +97,3 @@ class Done:
     def ordered(self) -> list[Outcome]:
         """The outcomes in the order asked for."""
         return sorted(self.outcomes, key=lambda outcome: outcome.place)
-
-    @property
-    def failures(self) -> list[Row]:
-        """Rows of cases that failed and were not expected to."""
-        from gradient_routes.bench.cases.expected import as_expected
-        from gradient_routes.bench.cases.row import ANSWERED
-
-        rows = [o.row for o in self.outcomes if o.row["status"] not in ANSWERED]
-        return [row for row in rows if not as_expected(row, self.known)]

@@ -6,14 +6,18 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from benchmarks.invented_store import fill
+from benchmarks.invented_store import case, fill
+from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.row import ANSWERED
 from gradient_routes.bench.render import html, source
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.store import cases as reading
 from gradient_routes.bench.store import export as exporting
 from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies.bill import done
 
 CASES = 88  # of eight routes
 
@@ -100,3 +104,20 @@ def test_an_export_in_pieces_is_the_whole_table(cli, large: Path) -> None:
     found = json.loads(cli("export", "--store", str(large), "--format", "json").out)
     assert found == [dict(zip(names, record, strict=True)) for record in records]
     assert json.loads(cli("export", "--store", str(large), "--format", "json", "--table", "samples").out) == []
+
+
+def test_a_run_keeps_some_of_its_rows(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The first ones, and some of those that failed; all are counted."""
+    monkeypatch.setattr(done, "MOST", 3)
+    rng = np.random.default_rng(0)
+    rows = [case(k, rng) for k in range(90)]
+    results = done.Done(None, False, (), views=False)
+    for place, row in enumerate(rows):
+        results.take(Outcome(row, place=place))
+    kept = [outcome.row["status"] for outcome in results.outcomes]
+    failed = [row for row in rows if row["status"] not in ANSWERED]
+    assert len(kept) == 6
+    assert len([status for status in kept if status not in ANSWERED]) == 3 < len(failed)
+    assert (results.count, results.failures) == (90, len(failed))
+    results.close(gradients=False)
+    assert "6 of 90 cases are shown; `routes export` writes all" in capsys.readouterr().out
