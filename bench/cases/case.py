@@ -154,7 +154,7 @@ def _specs(
     seen: set[str] = set()
     for grid in grids:
         target = _target(kind, grid.name, told)
-        for resolved in options.resolve(declared.declared_by(target).options, grid.grid, grid.name):
+        for resolved in options.resolve(registry.factory_of(target), grid.grid, grid.name):
             key = repr((grid.name, resolved))  # defaults need not be hashable
             if key not in seen:
                 seen.add(key)

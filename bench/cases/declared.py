@@ -15,7 +15,7 @@ from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.column import declared as column_of
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
-from gradient_routes.bench.cases.options import Option, options_of
+from gradient_routes.bench.cases.options import Described, options_of
 from gradient_routes.bench.cases.registry import Kind, factory_of, is_route
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.sources import Source, source
@@ -26,12 +26,11 @@ _KNOWN: dict[tuple[Kind, str], Declared] = {}
 
 
 @dataclass(frozen=True, eq=False)
-class Declared:
+class Declared(Described):
     """The options of a problem or a route, where its code is, what a route calls itself: what is needed without running
     it. It stands in place of the code where that is not imported.
     """
 
-    options: Mapping[str, Option]
     source: Source
     name: str = ""
 

@@ -43,9 +43,18 @@ class Option:
         return f"{self.name}={'' if self.default is None else self.default}"
 
 
+@dataclass(frozen=True, eq=False)
+class Described:
+    """Options that another process has read off a factory; it stands in place of the factory."""
+
+    options: Mapping[str, Option]
+
+
 @lru_cache(maxsize=256)  # a store may have 100 000 rows of a few factories
-def options_of(factory: Callable[..., Any]) -> dict[str, Option]:
+def options_of(factory: Callable[..., Any] | Described) -> dict[str, Option]:
     """The options `factory` declares: its keyword-only parameters, by name."""
+    if isinstance(factory, Described):
+        return dict(factory.options)
     try:
         parameters = inspect.signature(factory, eval_str=True).parameters.values()
     except Exception as error:  # annotations of a plug-in are its own code
@@ -69,8 +78,9 @@ def _kinds(annotation: Any) -> tuple[Any, ...]:
     return (annotation,)
 
 
-def resolve(options: Mapping[str, Option], grid: dict[str, list[str]], who: str) -> Iterator[dict[str, Any]]:
-    """All options at each point of the grid of texts, defaults elsewhere. Raises InputError."""
+def resolve(factory: Callable[..., Any] | Described, grid: dict[str, list[str]], who: str) -> Iterator[dict[str, Any]]:
+    """All options of `factory` at each point of the grid of texts, defaults elsewhere. Raises InputError."""
+    options = options_of(factory)
     unknown = [name for name in grid if name not in options]
     if unknown:
         known = did_you_mean(unknown[0], options)

@@ -328,10 +328,11 @@ def test_a_file_may_misbehave_in_a_worker_only(started: Shell, monkeypatch: pyte
     assert clock.jumps == 2, "in the survey, and as a case"
     rows = {row["problem"].partition(".")[0]: row for row in found}
     assert {name: row["status"] for name, row in rows.items()} == {
-        "hangs": "timeout", "leaves": "crashed", "raises": "crashed", "faulty": "ok",
+        "hangs": "timeout", "leaves": "crashed", "raises": "failed", "faulty": "ok",
     }  # fmt: skip
     assert "in its start" in rows["raises"]["reason"]
-    assert "ZeroDivisionError" in rows["raises"]["stderr"]
+    assert "cannot be imported: ZeroDivisionError" in rows["raises"]["reason"]
+    assert "ZeroDivisionError" in rows["raises"]["traceback"]
     started.nothing_is_left()
 
 
