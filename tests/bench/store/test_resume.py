@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import random
 import sqlite3
 import subprocess
 from collections import Counter
@@ -13,7 +12,7 @@ from pathlib import Path
 import pytest
 from commands import Ran, shell, with_routes
 
-from benchmarks.killing import Killing, killing, sound
+from benchmarks.faults import sound
 from gradient_routes.bench.cases import environment, keys, sources
 from gradient_routes.bench.cases.row import STATUSES, empty_row
 from gradient_routes.bench.store.resume import state_of
@@ -216,21 +215,6 @@ def test_a_full_disk_loses_no_printed_row_and_harms_no_store(plugin: Path) -> No
     assert shell(merge, plugin).stdout.startswith(f"{waiting} cases and 0 studies")
     assert routes(plugin, *sweep).rows == []
     assert len(store.rows()) == others + len(sizes)
-
-
-def test_a_sweep_killed_again_and_again_loses_nothing_and_repeats_nothing(tmp_path: Path) -> None:
-    """The full size is `python -m benchmarks.killing`."""
-    store = tmp_path / "s.sqlite"
-    found = killing(store, cases=12, kills=6, rng=random.Random(1), isolated=0.3)
-    assert (found.lost, found.repeated, found.left) == (0, 0, 0)
-    assert found.kills > 0
-    assert sound(store)
-    assert len({row["case_key"] for row in Store(store).rows()}) == 12
-
-
-def test_killings_add_up() -> None:
-    one, other = Killing(kills=2, runs=3, printed=[{}]), Killing(kills=1, lost=1)
-    assert str(one + other) == "3 kills, 1 lost, 0 repeated, 0 left running"
 
 
 def test_a_row_of_an_older_schema_is_missing(plugin: Path) -> None:
