@@ -424,13 +424,13 @@ def test_a_terminal_gets_a_progress_bar_for_more_than_one_case(tmp_path: Path) -
 
 
 def test_a_row_that_is_being_kept_is_kept_whatever_interrupts(cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    append = Store.append
+    append = Store.append_all
 
     def interrupted(*arguments: Any) -> Any:
         signal.raise_signal(signal.SIGINT)
         return append(*arguments)
 
-    monkeypatch.setattr(Store, "append", interrupted)
+    monkeypatch.setattr(Store, "append_all", interrupted)
     ran = cli("run", "--problem", "bar[n=2|3]", "--route", "adjoint", "--min-time", "0", "--json")
     assert ran.code == 130
     assert len(ran.rows) == len(Store(Path("results/routes.sqlite")).rows()) == 1
