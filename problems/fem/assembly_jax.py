@@ -1,9 +1,9 @@
 """Internal energy, residual and tangent of a hyperelastic solid, by JAX from the stored energy W.
 
-    Pi(u, q) = sum over points of W(I + grad u, q) dx,     f_int = dPi/du,     K = d^2 Pi/du^2
+    Pi(u, q) = sum over points of W(grad u, q) dx,     f_int = dPi/du,     K = d^2 Pi/du^2
 
 Routes that trace differentiate Pi. For NumPy callers f_int comes from the same Pi, and K from the moduli
-A = d^2 W/dF^2 at every point, contracted by BLAS in a tenth of the time that XLA needs for it.
+A = d^2 W/dH^2, H = grad u, at every point, contracted by BLAS in a tenth of the time that XLA needs for it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CELLS_PER_CHUNK = 128  # their arrays stay in cache
 
 
 class JaxAssembly:
-    """Element integrals of the energy W(F, q).
+    """Element integrals of the energy W(H, q).
 
     Arguments: u_e (n_e, n_a, 3) displacements of the cells' nodes [m]; q a tuple of material constants, numbers or
     (n_e,); dN (n_e, n_q, n_a, 3), or (1, n_q, n_a, 3) if the cells are congruent, and dx (n_e, n_q), their metric.
@@ -33,21 +33,21 @@ class JaxAssembly:
         at_points = jax.vmap(W, (0, None))  # over the points of a cell, which share q
         self._W = jax.jit(jax.vmap(at_points))
         self._A = jax.vmap(jax.vmap(_second_derivative(W), (0, None)))
-        self._F = jax.jit(deformation_gradients)
+        self._H = jax.jit(displacement_gradients)
         self._A_dx = jax.jit(self._moduli)
 
     def energy(self, u_e: Any, q: Any, dN: Any, dx: Any) -> Any:
         """Sum of W dx; traceable, holomorphic if W is."""
-        return (self._W(deformation_gradients(u_e, dN), _per_cell(q, dx)) * dx).sum()
+        return (self._W(displacement_gradients(u_e, dN), _per_cell(q, dx)) * dx).sum()
 
-    def _moduli(self, F: Any, q: Any, dx: Any) -> Any:
+    def _moduli(self, H: Any, q: Any, dx: Any) -> Any:
         """A_iJjL dx, (n_e, n_q, 3, 3, 3, 3) in the order J i j L."""
-        A = self._A(F, _per_cell(q, dx))
+        A = self._A(H, _per_cell(q, dx))
         return jnp.swapaxes(A * dx[..., None, None, None, None], 2, 3)
 
     def element_tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, selected: Array) -> Array:
         """Entries `pick` of the element matrices K_(ai)(bj) = sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k)."""
-        return element_matrices(np.asarray(self._A_dx(self._F(u_e, dN), q, dx)), dN, selected)
+        return element_matrices(np.asarray(self._A_dx(self._H(u_e, dN), q, dx)), dN, selected)
 
 
 @cache
@@ -56,13 +56,13 @@ def assembly(W: Energy) -> JaxAssembly:
     return JaxAssembly(W)
 
 
-def deformation_gradients(u_e: Any, dN: Any) -> Any:
-    """F = I + grad u at every point, (n_e, n_q, 3, 3); one matrix product if the cells are congruent."""
+def displacement_gradients(u_e: Any, dN: Any) -> Any:
+    """H = grad u at every point, (n_e, n_q, 3, 3); one matrix product if the cells are congruent."""
     n_e, n_a, _ = u_e.shape
     if len(dN) > 1:
-        return jnp.einsum("eai,eqaj->eqij", u_e, dN) + jnp.eye(3)
+        return jnp.einsum("eai,eqaj->eqij", u_e, dN)
     B = jnp.einsum("qaj,ik->akqij", dN[0], jnp.eye(3)).reshape(3 * n_a, -1)
-    return (u_e.reshape(n_e, -1) @ B).reshape(n_e, -1, 3, 3) + jnp.eye(3)
+    return (u_e.reshape(n_e, -1) @ B).reshape(n_e, -1, 3, 3)
 
 
 def _per_cell(q: Any, dx: Any) -> Any:
@@ -155,12 +155,12 @@ def gradient(f: Callable[..., Any], argument: int) -> Callable[..., Any]:
 
 
 def _second_derivative(W: Energy) -> Callable[[Any, Any], Any]:
-    """A(F, q) = d^2 W / dF^2, (3, 3, 3, 3), forward over reverse."""
+    """A(H, q) = d^2 W / dH^2, (3, 3, 3, 3), forward over reverse."""
 
-    def A(F: Any, q: Any) -> Any:
+    def A(H: Any, q: Any) -> Any:
         P = gradient(W, 0)
-        directions = jnp.eye(9, dtype=F.dtype).reshape(9, 3, 3)
-        columns = jax.vmap(lambda D: jax.jvp(lambda F: P(F, q), (F,), (D,))[1])(directions)  # (9, 3, 3), by jL
+        directions = jnp.eye(9, dtype=H.dtype).reshape(9, 3, 3)
+        columns = jax.vmap(lambda D: jax.jvp(lambda H: P(H, q), (H,), (D,))[1])(directions)  # (9, 3, 3), by jL
         return jnp.moveaxis(columns.reshape(3, 3, 3, 3), (0, 1), (2, 3))
 
     return A

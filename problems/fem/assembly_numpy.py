@@ -27,8 +27,8 @@ class NumpyAssembly:
         dN, dx = solid.metric(s, np)
         parts = []
         for case in range(len(solid.directions)):
-            F = self._F(solid.displacements(u, s, case, self.nodes), dN)
-            f_e = _element_forces(self.material.P(F, _per_point(s.q, F)), dN, dx)
+            H = self._H(solid.displacements(u, s, case, self.nodes), dN)
+            f_e = _element_forces(self.material.P(H, _per_point(s.q, H)), dN, dx)
             f, _ = solid.bc.assemble(f_e, self.nodes, case)
             external = solid.external_forces(u, s, case)
             parts.append(f if external is None else f - solid.bc.assemble(external, solid.loaded.nodes, case)[0])
@@ -38,8 +38,8 @@ class NumpyAssembly:
         """Entries `pick` of the element matrices: see Solid.tangents."""
         from gradient_routes.problems.fem.assembly_jax import element_matrices
 
-        F = self._F(u_e, dN)
-        A = self.material.A(F, _per_point(q, F)) * dx[..., None, None, None, None]
+        H = self._H(u_e, dN)
+        A = self.material.A(H, _per_point(q, H)) * dx[..., None, None, None, None]
         return element_matrices(A.swapaxes(2, 3), dN, selected)
 
     def R_p(self, u: Array, p: Array) -> Any:
@@ -52,10 +52,10 @@ class NumpyAssembly:
         dN, dx = solid.metric(s, np)
         rows, columns, entries = [], [], []
         for case in range(len(solid.directions)):
-            F = self._F(solid.displacements(u, s, case, self.nodes), dN)
+            H = self._H(solid.displacements(u, s, case, self.nodes), dN)
             dofs = solid.bc.dofs(self.nodes, case)
             free = dofs >= 0
-            for P_q, (q_p, column) in zip(self.material.P_q(F, _per_point(s.q, F)), derivative(p), strict=True):
+            for P_q, (q_p, column) in zip(self.material.P_q(H, _per_point(s.q, H)), derivative(p), strict=True):
                 f_e = _element_forces(P_q, dN, dx).reshape(dofs.shape) * q_p[:, None]
                 rows.append(case * solid.bc.n_free + dofs[free])
                 columns.append(np.broadcast_to(column[:, None], dofs.shape)[free])
@@ -65,8 +65,8 @@ class NumpyAssembly:
         return coo_array((data, (i, j)), shape=(solid.bc.n_u, len(p))).tocsr()
 
     @staticmethod
-    def _F(u_e: Array, dN: Array) -> Array:
-        return np.asarray(np.swapaxes(u_e, 1, 2)[:, None] @ dN + np.eye(3))
+    def _H(u_e: Array, dN: Array) -> Array:
+        return np.asarray(np.swapaxes(u_e, 1, 2)[:, None] @ dN)
 
 
 def _element_forces(P: Array, dN: Array, dx: Array) -> Array:
@@ -76,6 +76,6 @@ def _element_forces(P: Array, dN: Array, dx: Array) -> Array:
     return np.asarray(dN.transpose(0, 2, 1, 3).reshape(n, n_a, n_q * 3) @ P_dx)
 
 
-def _per_point(q: Any, F: Array) -> tuple[Array, ...]:
+def _per_point(q: Any, H: Array) -> tuple[Array, ...]:
     """Constants (n_e, 1), to broadcast over the points of a cell."""
-    return tuple(np.broadcast_to(c, len(F))[:, None] for c in q)
+    return tuple(np.broadcast_to(c, len(H))[:, None] for c in q)

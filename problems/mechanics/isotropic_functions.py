@@ -31,18 +31,16 @@ from gradient_routes.problems.problem import Array
 NODES = 24  # 1e-12 for principal stretches from 1/3 to 3 in any combination, 1e-7 to 5, 1e-3 to 10
 
 
-def isochoric_powers(I1: Any, I2: Any, J: Any, exponents: tuple[float, ...]) -> Any:
+def isochoric_powers(i1: Any, i2: Any, exponents: tuple[float, ...]) -> Any:
     """sum_i lambar_i^alpha for every alpha, with lambar_i = J^(-1/3) lambda_i: (len(exponents),).
 
-    From the invariants I1, I2 of C = F^T F and J = det F, scalars of jax.numpy.
+    From the isochoric invariants i1 = J^(-2/3) I1 - 3 and i2 = J^(-4/3) I2 - 3, scalars of jax.numpy.
     """
 
-    def powers(invariants: Any) -> Any:
-        I1, I2, J = invariants
-        e1, e2 = J ** (-2.0 / 3.0) * I1, J ** (-4.0 / 3.0) * I2
-        return jnp.stack([power_trace(e1, e2, 1.0, alpha / 2.0) for alpha in exponents])
+    def powers(i: Any) -> Any:
+        return jnp.stack([power_trace(3.0 + i[0], 3.0 + i[1], 1.0, alpha / 2.0) for alpha in exponents])
 
-    return differentiate_by_jacobian(powers)(jnp.stack([I1, I2, J]))
+    return differentiate_by_jacobian(powers)(jnp.stack([i1, i2]))
 
 
 def differentiate_by_jacobian(f: Callable[[Any], Any]) -> Callable[[Any], Any]:

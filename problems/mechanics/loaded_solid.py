@@ -1,6 +1,6 @@
 """Equilibrium R(u, p) = 0 of a hyperelastic solid under dead tractions, prescribed displacements or follower loads.
 
-    Pi(u, p) = sum over quadrature points of W(F, q) dx - work of dead tractions,     R = dPi/du - follower forces
+    Pi(u, p) = sum over quadrature points of W(grad u, q) dx - work of dead tractions,     R = dPi/du - follower forces
 
 p enters through a Setup: material constants, nodal positions and the load.
 """

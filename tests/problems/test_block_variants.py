@@ -359,15 +359,15 @@ def test_invalid_meshes_are_refused(kind: str, cells: list, moved: list | None, 
 
 def test_elements_inside_out_bear_nothing_in_real_and_complex_arithmetic() -> None:
     """Else Newton's method, or the complex step alone, would converge to states that no body can take."""
-    F = np.diag([1.0, 1.0, -0.5])
+    H = np.diag([0.0, 0.0, -1.5])
     for law in LAWS.values():
         if law.name != "linear":
             q = law.of_modulus(1.0, 0.3)
             P = jax.jit(gradient(law.W, 0))
             for dtype in (float, complex):
-                assert not np.isfinite(P(F.astype(dtype), q)).all(), law.name
+                assert not np.isfinite(P(H.astype(dtype), q)).all(), law.name
             if law.numpy is not None:
-                assert not np.isfinite(law.numpy.P(F[None] + 0j, tuple(np.ones((len(q), 1))))).all()
+                assert not np.isfinite(law.numpy.P(H[None] + 0j, tuple(np.ones((len(q), 1))))).all()
 
 
 def test_a_shape_that_folds_a_cell_is_refused() -> None:
