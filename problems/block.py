@@ -129,7 +129,6 @@ class Block(Problem):
         self.linear = law == "linear" and load != "follower"
         self.affine = self.linear and unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
-        self.offset = float(np.ptp(self.mesh.bounding_box, axis=0).max())  # F = 1 + grad u
         self.matrix_free = not use_numpy
         self.noise, self.seed, self.synthetic = noise, seed, data == "twin"
         if nu > NEARLY_INCOMPRESSIBLE:

@@ -10,7 +10,7 @@ import numpy as np
 from gradient_routes.problems.errors import NotConverged, SingularMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
 from gradient_routes.routes.load_stepping import by_load_steps
-from gradient_routes.routes.newton import Solver, State, System, newton, norm
+from gradient_routes.routes.newton import Solver, State, System, newton, norm, rounding
 from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact, Operations
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
@@ -176,6 +176,14 @@ class Model:
         """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that another solver found: two residuals."""
         scale = norm(self.residual(self.problem.initial(p), p))
         return norm(self.residual(u, p)) / (scale or 1.0)
+
+    def tolerance(self, u: Array, state: State) -> float:
+        """|R|_inf / |R_0|_inf at u (n_u,) that counts as solved: rtol, or what rounding leaves where that is more.
+
+        |R_u| is that of `state`, a solved state near u.
+        """
+        least = rounding(u, state.factors.norm, self.problem.offset)
+        return max(self.solver.rtol, least / state.scale if state.scale else least)
 
     def value(self, p: Array) -> float:
         """J(p) by one forward solve, or by the `value` of a black box."""

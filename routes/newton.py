@@ -19,6 +19,7 @@ from gradient_routes.routes.tally import Work
 STEP_LENGTHS = tuple(0.5**i for i in range(9))
 DESCENT = 1e-4  # of |R|, times the step length, for a step to be taken
 ROUNDING = 16.0 * np.finfo(np.float64).eps  # |R| <= ROUNDING |R_u| (|u| + |X|): no iteration can do better
+RESOLVED = 1e-6  # of |u|: where rounding of X + u is more, u is not resolved
 CANCELLED = 1e4  # |u| / |u - du| beyond which u - du has lost digits, which |R| may not show
 LAST = 8  # iterates in a message
 
@@ -27,7 +28,7 @@ Newton = Literal["full", "inexact"]
 
 @dataclass(frozen=True)
 class Solver:
-    """When a forward solve is done: |R|_inf <= rtol |R(u_0)|_inf, or R is rounding; at most max_steps steps.
+    """When a forward solve is done: |R|_inf <= rtol |R(u_0)|_inf, or R is rounding (see `rounding`); max_steps at most.
 
     linear_solver  the name of a registered LinearSolver; auto: the best direct one that is installed
     newton         full: R_u is factorized at every step; inexact: once, and again where that is cheaper than
@@ -115,8 +116,8 @@ def newton(
         for a in STEP_LENGTHS if system.line_search else (1.0,):
             u_next = u - a * du
             R_next, set_next = system.residual(u_next), system.active_set(u_next)
-            rounding = ROUNDING * norm_of_R_u * (norm(u_next) + system.offset)
-            small = norm(R_next) <= max(solver.rtol * scale, rounding) and set_next == sets[-1]
+            small = norm(R_next) <= max(solver.rtol * scale, rounding(u_next, norm_of_R_u, system.offset))
+            small &= set_next == sets[-1]
             small |= max(norm(R_next), history[-1]) <= solver.rtol * scale
             small &= norm(u) <= CANCELLED * (norm(u_next) + system.offset)
             lower = norm(R_next) <= (1.0 - DESCENT * a) * history[-1]
@@ -125,7 +126,7 @@ def newton(
         else:
             if system.direction.renew():
                 continue
-            raise _failure(who, history, sets, "no step along Newton's direction lowers |R|")
+            raise _failure(who, history, sets, scale, f"no step lowers |R|, wanted {solver.rtol:g}")
         u, R = u_next, R_next
         history.append(norm(R))
         sets.append(set_next)
@@ -137,12 +138,21 @@ def newton(
         raise NotConverged(
             f"{who}: R is not finite where the solve starts - lower the load or choose another p", tuple(history)
         )
-    raise _failure(who, history, sets, f"wanted {solver.rtol * scale:.3g}, max-steps={solver.max_steps}")
+    raise _failure(who, history, sets, scale, f"wanted {solver.rtol:g}, max-steps={solver.max_steps}")
 
 
-def _failure(who: str, history: list[float], sets: list[Hashable | None], why: str) -> NotConverged:
+def rounding(u: Array, norm_of_R_u: float, offset: float) -> float:
+    """|R| that rounding of u, or of X + u with |X| = offset, leaves at a solution u (n_u,)."""
+    size = norm(u)
+    return norm_of_R_u * min(ROUNDING * (size + offset), RESOLVED * size)
+
+
+def _failure(who: str, history: list[float], sets: list[Hashable | None], scale: float, why: str) -> NotConverged:
     last = " ".join(f"{r:.2g}" for r in history[-LAST:])
-    report = f"not converged in {len(history) - 1} steps: {why}; |R| = {last} - lower the load or start nearer"
+    relative = f"|R| / |R_0| = {history[-1] / scale:.2g}, " if scale else ""
+    report = (
+        f"not converged in {len(history) - 1} steps: {relative}{why}; |R| = {last} - lower the load or start nearer"
+    )
     visited = "" if sets[-1] is None else f"; active sets: {' '.join(str(one) for one in sets[-LAST:])}"
     return NotConverged(f"{who}: {report}{visited}", tuple(history))
 

@@ -122,6 +122,11 @@ def row_of(known: Row) -> Row:
     return row | known
 
 
+def measured(row: Row) -> bool:
+    """Whether a row has the numbers of a gradient: also that of an iterate which is no solution."""
+    return row["status"] == "ok" or (row["status"] == "not-converged" and row["gradient_norm"] is not None)
+
+
 def clean(value: Any) -> Any:
     """JSON and SQL have no NaN: what is not a finite number is absent, inside objects, too."""
     if isinstance(value, dict):

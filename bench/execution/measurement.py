@@ -25,6 +25,7 @@ from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Judge, KnownJudges, norm2
+from gradient_routes.bench.execution.solved import rounding, unsolved
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
@@ -152,23 +153,30 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
     record.add({"first_s": first_s})
     record.add(_checked(context, route, result, record))
     begin("judgement")
+    reason = unsolved(context, route, result)
+    if reason is None and (why := rounding(context, result)) is not None:
+        record.note(f"{route.name}: {why}")
     _judge(context, route, record, np.asarray(result.gradient))
     begin("the counting of its work")
     _count(context, route, options, lambda: gradient(p), model, record)
     rounds = Rounds(lambda: gradient(p), context.forward(), first_s, context.settings.min_time)
     begin("timing")
-    return Measurement(context, route, record, result, rounds if context.settings.timed else None)
+    return Measurement(context, route, record, result, rounds if context.settings.timed else None, reason)
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """A case that has been prepared, called and judged; its timing comes in turns, where it is timed."""
+    """A case that has been prepared, called and judged; its timing comes in turns, where it is timed.
+
+    unsolved  why its gradient belongs to no solved state, None where it does
+    """
 
     context: CaseContext
     route: Route
     record: Record
     result: Result
     rounds: Rounds | None
+    unsolved: str | None
 
     @property
     def long(self) -> bool:
@@ -188,7 +196,8 @@ class Measurement:
         context = self.context
         with undisturbed():
             return self.record.ended(
-                Status.OK,
+                Status.OK if self.unsolved is None else Status.NOT_CONVERGED,
+                self.unsolved,
                 samples=samples,
                 view=context.view(self.route, self.result),
                 fields=context.fields(self.result),

@@ -12,7 +12,7 @@ from rich.text import Text
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.expected import Expectation, judged
 from gradient_routes.bench.cases.outcome import View
-from gradient_routes.bench.cases.row import ANSWERED
+from gradient_routes.bench.cases.row import ANSWERED, measured
 from gradient_routes.bench.execution.cost_model import LEGEND as WORK
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.execution.isolation.stack import without
@@ -106,13 +106,13 @@ def _usual_reference(rows: Sequence[Row]) -> str | None:
 
 
 def _cells(row: Row) -> list[str]:
-    if row["status"] != "ok":
+    if not measured(row):
         return ["", row["status"], "", "", _work(row["predicted_work"]), "", ""]
     per_iteration = row["tape_bytes_per_iteration"]
     return [
         number(row["objective"], 4),
         number(row["gradient_error"], 2) or "unknown",
-        ("~" if row["unstable"] else "") + seconds(row["seconds"]),
+        ("~" if row["unstable"] else "") + seconds(row["seconds"]) if row["status"] == "ok" else row["status"],
         ratio(row["forward_ratio"]),
         _work(row["work"]),
         bytes_(row["peak_bytes"], RESOLUTION),

@@ -9,7 +9,7 @@ from typing import Any
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
-from gradient_routes.bench.cases.row import LIMITED
+from gradient_routes.bench.cases.row import LIMITED, measured
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.studies.scaling.sizes import Sizes
 from gradient_routes.bench.units import duration
@@ -32,7 +32,7 @@ class Series:
     @property
     def rows(self) -> list[Row]:
         """What was measured."""
-        return [row for _, row in self.cases if row["status"] == "ok"]
+        return [row for _, row in self.cases if measured(row)]
 
     @property
     def stopped_by(self) -> str:
@@ -93,7 +93,7 @@ class Climb:
     def _prune(self, spec: ProblemSpec) -> None:
         """Not tried: what grows as it did between the last two sizes is over the budget here."""
         for series in self.live:
-            known = [(self.sizes.magnitude(of), row["seconds"]) for of, row in series.cases if row["status"] == "ok"]
+            known = [(self.sizes.magnitude(of), row["seconds"]) for of, row in series.cases if measured(row)]
             if len(known) < 2:
                 continue
             predicted = extrapolated(known[-2], known[-1], self.sizes.magnitude(spec))

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.row import measured
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.isolation.signals import Interrupt
 from gradient_routes.bench.execution.sweep import run
@@ -137,7 +138,7 @@ def _at_one_size(group: Sequence[Series]) -> Series:
     ran: dict[str, list[tuple[ProblemSpec, Row]]] = {}
     for series in group:
         for spec, row in series.cases:
-            if row["status"] == "ok":
+            if measured(row):
                 ran.setdefault(repr(spec.options), []).append((spec, row))
     enough = [cases for cases in ran.values() if len(cases) >= FEWEST] or sorted(ran.values(), key=len)
     merged.cases = sorted(enough[-1], key=lambda case: int(abscissa(case[1], "iterations") or 0)) if enough else []

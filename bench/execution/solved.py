@@ -1,0 +1,58 @@
+"""Whether the gradient of a route belongs to a solved state, measured: R at the state that the route returns."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+
+from gradient_routes.bench.execution.case_context import CaseContext
+from gradient_routes.problems.errors import RoutesError
+from gradient_routes.problems.problem import Array
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import State, norm
+from gradient_routes.routes.route import Result, Route
+
+APART = 10.0  # Newton corrections: two states further apart are not approximations of one
+SAME = 1e-8  # of |u|: nearer than that they are, whatever the corrections say
+
+
+def unsolved(context: CaseContext, route: Route, result: Result) -> str | None:
+    """Why the state of a result does not solve R(u, p) = 0 as the forward solve does, with figures; None if it does.
+
+    Law: |R(u, p)| <= rtol |R(u_0, p)|, or R is rounding there (Model.tolerance); and u is the forward solve's. Routes
+    that return no state solve for theirs by Model.solve, which raises NotConverged. A residual or two, not counted.
+    """
+    state = context.price()[1]
+    if state is None or result.u is None or np.shape(result.u) != state.u.shape:
+        return None
+    model, u = context.model(), np.asarray(result.u)
+    residual, wanted = model.relative_residual(u, context.p), model.tolerance(u, state)
+    if not residual <= wanted:
+        return (
+            f"{route.name}: |R| / |R_0| = {residual:.2g} at the state of this gradient, wanted {wanted:.2g}"
+            " - iterate further, or take implicit-ad or adjoint"
+        )
+    return None if np.array_equal(u, state.u) else _elsewhere(model, route, u, state)
+
+
+def rounding(context: CaseContext, result: Result) -> str | None:
+    """That R is rounding at the state of a result where that is above rtol; None where |R| <= rtol |R_0|."""
+    rtol = context.settings.solver.rtol
+    if result.residual is None or not result.residual > rtol:
+        return None
+    return f"|R| / |R_0| = {result.residual:.2g} is rounding of R, rtol {rtol:g} is out of reach"
+
+
+def _elsewhere(model: Model, route: Route, u: Array, state: State) -> str | None:
+    """That u is another solution than the forward solve's."""
+    off, size = norm(u - state.u), norm(state.u)
+    with suppress(RoutesError):  # of a linear solver that iterates
+        both = (model.problem.residual(at, state.p) for at in (u, state.u))
+        near = APART * sum(norm(state.factors.solve(R)) for R in both)
+        if off > SAME * size + near:
+            return (
+                f"{route.name}: its state is off that of the forward solve by {off / (size or 1.0):.2g} |u|, Newton"
+                f" corrections explain {near / (size or 1.0):.2g} - take implicit-ad or adjoint"
+            )
+    return None
