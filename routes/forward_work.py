@@ -38,7 +38,7 @@ class ForwardWork:
             return self.solves(times, polish)
         steps = times * (self.cold.newton_iterations + polish)
         steps = steps if self.counted is None else self.counted.newton_iterations
-        return Work(forward_solves=times, residuals=times * (1 + self._halvings())) + self._newton(steps)
+        return Work(forward_solves=times, residuals=times * (1 + self.halvings())) + self._newton(steps)
 
     def solves(self, times: int, polish: int = 0) -> Work:
         """`times` cold solves near p, each with `polish` steps more: see Model.solve."""
@@ -81,9 +81,9 @@ class ForwardWork:
             return None
         k, m, f = self.counted.newton_iterations, self.counted.matvecs, self.counted.factorizations
         assemblies = f if self.matrix_free else (k if directions is None else directions)
-        return Work(solves, k, k + solves + cold * self._halvings(), m, assemblies, f, k + m)
+        return Work(solves, k, k + solves + cold * self.halvings(), m, assemblies, f, k + m)
 
-    def _halvings(self) -> int:
+    def halvings(self) -> int:
         """Residuals that a cold solve's line searches take."""
         return self.cold.residuals - self.cold.newton_iterations - self.cold.forward_solves
 

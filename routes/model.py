@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -10,8 +12,8 @@ import numpy as np
 from gradient_routes.problems.errors import NotConverged, SingularMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
 from gradient_routes.routes.load_stepping import by_load_steps
-from gradient_routes.routes.newton import Solver, State, System, newton, norm, rounding
-from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact, Operations
+from gradient_routes.routes.newton import Solver, State, System, newton, norm, rounding, unwatched
+from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact, Operations, Recorded, Step
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.tally import Tally
@@ -89,10 +91,6 @@ class Model:
             return self.problem.tangent_operator(state.u, state.p)
         return self.tangent(state.u, state.p)
 
-    def newton_correction(self, factors: Factorization, R: Array) -> Array:
-        self.tally.count("newton_iterations")
-        return self.solve_linear(factors, R)
-
     def linearize(self, state: State) -> Linearization:
         """R_p, J_u, J_p at a solved state. Not counted: they cost about as much as a residual."""
         return self.problem.linearize(state.u, state.p)
@@ -125,15 +123,31 @@ class Model:
         J = self.problem.objective(u, p)
         return State(p, u, J, history, scale, steps.factors, self.tally.work - before, steps.rate)
 
+    def newton_iterates(self, p: Array, k: int) -> tuple[list[Step], float]:
+        """The first k full Newton steps of a cold solve, with its line search, and |R|_inf / |R_0|_inf after them.
+
+        They go on where the solve would end. Raises NotConverged where there are no k steps, as where a solve takes
+        load steps.
+        """
+        self.tally.count("forward_solves")
+        steps = Recorded(self._operations(p))
+        try:
+            self._newton(self.problem.initial(p), p, None, steps, polish=k, at_most=k, taken=steps.taken)
+        except NotConverged as end:
+            if len(steps.steps) < k:
+                raise
+            history = end.history
+        return steps.steps, history[-1] / (history[0] or 1.0)
+
     @property
     def inexact(self) -> bool:
         """Whether real states are solved for by inexact steps."""
         problem = self.problem
         return self.solver.newton == "inexact" and not problem.linear and problem.line_search
 
-    def _direction(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> Direction:
+    def _operations(self, p: Array) -> Operations:
         problem = self.problem
-        operations = Operations(
+        return Operations(
             assemble=lambda u: self.tangent(u, p),
             factorize=self.factorize,
             operator=(lambda u: problem.tangent_operator(u, p)) if problem.matrix_free else None,
@@ -142,6 +156,9 @@ class Model:
             step=lambda: self.tally.count("newton_iterations"),
             symmetric=problem.structure != "general",
         )
+
+    def _direction(self, p: Array, start: State | None = None, factors: Factorization | None = None) -> Direction:
+        operations = self._operations(p)
         if factors is not None:
             return Chord(operations, factors)
         if self.inexact and not np.iscomplexobj(p):
@@ -160,8 +177,10 @@ class Model:
         direction: Direction,
         unloading: Any = 0.0,
         polish: int = 0,
+        at_most: int | None = None,
+        taken: Callable[[float, Array], None] = unwatched,
     ) -> tuple[Array, tuple[float, ...], float]:
-        """Newton's method on R + unloading, from u."""
+        """Newton's method on R + unloading, from u, `at_most` steps [max_steps]."""
         problem = self.problem
         system = System(
             problem.offset,
@@ -169,8 +188,10 @@ class Model:
             direction,
             problem.line_search,
             lambda u: problem.active_set(u, p),
+            taken,
         )
-        return newton(system, u, self.solver, self._who, scale, polish)
+        solver = self.solver if at_most is None else replace(self.solver, max_steps=at_most)
+        return newton(system, u, solver, self._who, scale, polish)
 
     def relative_residual(self, u: Array, p: Array) -> float:
         """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that another solver found: two residuals."""

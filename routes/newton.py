@@ -77,15 +77,23 @@ class State:
         return self.history[-1] / self.scale if self.scale else self.history[-1]
 
 
+def unwatched(a: float, u: Array) -> None:
+    return None
+
+
 @dataclass(frozen=True)
 class System:
-    """R(u) = 0 for Newton's method: a problem bound to one p, and how its steps are found."""
+    """R(u) = 0 for Newton's method: a problem bound to one p, and how its steps are found.
+
+    taken  is called with the length of every step that is taken, and the iterate it leads to
+    """
 
     offset: float
     residual: Callable[[Array], Array]
     direction: Direction
     line_search: bool
     active_set: Callable[[Array], Hashable | None]
+    taken: Callable[[float, Array], None] = unwatched
 
 
 def newton(
@@ -128,6 +136,7 @@ def newton(
                 continue
             raise _failure(who, history, sets, scale, f"no step lowers |R|, wanted {solver.rtol:g}")
         u, R = u_next, R_next
+        system.taken(a, u)
         history.append(norm(R))
         sets.append(set_next)
         if small:

@@ -75,6 +75,34 @@ class Full:
         return False
 
 
+@dataclass(frozen=True)
+class Step:
+    """A step u' = u - a du that was taken, R_u du = R: arrays (n_u,), factors of R_u(u)."""
+
+    u: Array
+    du: Array
+    factors: Factorization
+    a: float
+    after: Array
+
+
+class Recorded(Full):
+    """Full, with every step that is taken kept."""
+
+    def __init__(self, operations: Operations) -> None:
+        super().__init__(operations)
+        self.steps: list[Step] = []
+
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
+        du, size = super().__call__(u, R, scale, goal)
+        self._last = u, du
+        return du, size
+
+    def taken(self, a: float, after: Array) -> None:
+        assert self.factors is not None
+        self.steps.append(Step(*self._last, self.factors, a, after))
+
+
 class Chord:
     """A du = R with given factors of A."""
 

@@ -35,9 +35,9 @@ def cost(
     n_p: int, forward: ForwardWork, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None
 ) -> Work:
     if inner == "direct":
-        k = iterations
-        steps = Work(newton_iterations=k, residuals=k, assemblies=k, factorizations=k, solves=k)
-        return Work(forward_solves=1, residuals=2, transposed_solves=k) + steps
+        k, known = iterations, forward.counted
+        residuals = 1 + k + forward.halvings() if known is None else known.residuals
+        return Work(1, k, residuals, assemblies=k, factorizations=k, solves=k, transposed_solves=k)
     again = 0 if checkpoint is None else iterations - iterations % checkpoint
     return Work(forward_solves=1, residuals=2, matvecs=(newton or 1) * (2 * iterations + again))
 
@@ -203,37 +203,37 @@ def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, 
         J, pullback, u = sweep(p)
         model.tally.count("forward_solves")
         model.tally.count("matvecs", products)
-        return finished(model, p, u, J, sweep_back(pullback), held_bytes(pullback), what)
+        dJ_dp, residual = sweep_back(pullback), model.relative_residual(np.asarray(u), p)
+        return finished(u, J, dJ_dp, residual, held_bytes(pullback), what)
 
     return gradient
 
 
 def through_newton(model: Model, k: int) -> Gradient:
-    """Every Newton step recorded eagerly, its factors kept for its own transposed solve."""
+    """The steps of a forward solve on the tape, the factors of each kept for its own transposed solve."""
     from gradient_routes.problems.jax64 import jax
     from gradient_routes.routes.differentiable import held_bytes
     from gradient_routes.routes.unrolled_newton import UnrolledNewton
 
-    u_k = UnrolledNewton(model, k)
+    u_k = UnrolledNewton(model)
     objective = jax.jit(model.traced.objective)
 
     def gradient(p: Array) -> Result:
-        u_0 = model.problem.initial(p)
+        steps, residual = model.newton_iterates(p, k)
 
         def with_state(p: Any) -> tuple[Any, Any]:
-            u = u_k(u_0, p)
+            u = u_k(steps, p)
             return objective(u, p), u
 
-        model.tally.count("forward_solves")
         J, pullback, u = jax.vjp(with_state, p, has_aux=True)
-        tape = held_bytes(pullback) + u_k.factor_bytes
-        return finished(model, p, u, J, pullback(1.0)[0], tape, f"{k} Newton steps")
+        tape = held_bytes(pullback) + sum(step.factors.nbytes for step in steps)
+        return finished(u, J, pullback(1.0)[0], residual, tape, f"{k} Newton steps")
 
     return gradient
 
 
-def finished(model: Model, p: Array, u: Any, J: Any, dJ_dp: Any, tape: int, what: str) -> Result:
-    """The result with its residual. Raises Overflow where a sweep exceeded the range of float64."""
+def finished(u: Any, J: Any, dJ_dp: Any, residual: float, tape: int, what: str) -> Result:
+    """The result. Raises Overflow where a sweep exceeded the range of float64."""
     dJ_dp = np.asarray(dJ_dp)
     if not np.isfinite(J):
         raise Overflow(
@@ -244,5 +244,4 @@ def finished(model: Model, p: Array, u: Any, J: Any, dJ_dp: Any, tape: int, what
             f"unrolled-ad: J = {J:g}, but the backward sweep of {what} overflowed: it amplifies rounding where R_u is"
             " ill-conditioned - iterate less, or take implicit-ad or adjoint"
         )
-    residual = model.relative_residual(np.asarray(u), p)
     return Result(float(J), dJ_dp, np.asarray(u), residual, tape=tape)

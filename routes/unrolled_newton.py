@@ -1,21 +1,22 @@
-"""Newton's loop on JAX's tape, factors of every step kept: the direct form of unrolled AD."""
+"""Newton's steps on JAX's tape, factors of every step kept: the direct form of unrolled AD."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.solvers.solver import Factorization
+from gradient_routes.routes.newton_steps import Step
 
 
 class TapedStep:
-    """A Newton step on the tape: arrays u, p, du as leaves, factors of R_u(u, p) as a constant."""
+    """A Newton step on the tape: arrays u, p, du as leaves, its length and factors of R_u(u, p) as constants."""
 
-    def __init__(self, u: Any, p: Any, du: Any, factors: Factorization) -> None:
-        self.u, self.p, self.du, self.factors = u, p, du, factors
+    def __init__(self, u: Any, p: Any, step: Step) -> None:
+        self.u, self.p, self.du, self.step = u, p, jnp.asarray(step.du), step
 
 
 # the leaves are declared so that they count as bytes of the tape; the object itself is passed on
@@ -23,18 +24,18 @@ jax.tree_util.register_pytree_node(TapedStep, lambda kept: ((kept.u, kept.p, kep
 
 
 class UnrolledNewton:
-    """u_k(p) by k full Newton steps from u_0; differentiable by jax.vjp, eagerly.
+    """u_k(p) by the Newton steps that were taken, line search included; differentiable by jax.vjp, eagerly.
 
-    One step is u' = u - du, R_u du = R. Differentiating it, R_u included, gives for an incoming u'_bar
+    One step is u' = u - a du, R_u du = R, its length a held. Differentiating it, R_u included, gives for an incoming
+    u'_bar
 
-        R_u^T w = -u'_bar,    (u_bar, p_bar) = (u'_bar, 0) + w^T d[R - R_u du]/d(u, p)
+        R_u^T w = -a u'_bar,    (u_bar, p_bar) = (u'_bar, 0) + w^T d[R - R_u du]/d(u, p)
 
     with du held: one transposed solve with the step's own factors, and products with second derivatives of R.
     """
 
-    def __init__(self, model: Model, k: int) -> None:
-        self.model, self.k = model, k
-        self.factor_bytes = 0
+    def __init__(self, model: Model) -> None:
+        self.model = model
         R = model.traced.residual
 
         def linearized(u: Any, p: Any, du: Any) -> Any:
@@ -43,24 +44,19 @@ class UnrolledNewton:
             return value - along
 
         self._pullback = jax.jit(lambda u, p, du, w: jax.vjp(lambda u, p: linearized(u, p, du), u, p)[1](w))
-        self._step = jax.custom_vjp(lambda u, p: self._forward(u, p)[0])
-        self._step.defvjp(self._forward, self._backward)
 
-    def __call__(self, u_0: Any, p: Any) -> Any:
-        self.factor_bytes = 0
-        u = jnp.asarray(u_0)
-        for _ in range(self.k):
-            u = self._step(u, p)
+    def __call__(self, steps: Sequence[Step], p: Any) -> Any:
+        u = jnp.asarray(steps[0].u)
+        for step in steps:
+            u = self._taped(step)(u, p)
         return u
 
-    def _forward(self, u: Any, p: Any) -> tuple[Any, TapedStep]:
-        model, u_, p_ = self.model, np.asarray(u), np.asarray(p)
-        factors = model.factorize(model.tangent(u_, p_))
-        du = model.newton_correction(factors, model.residual(u_, p_))
-        self.factor_bytes += factors.nbytes
-        return u - du, TapedStep(u, p, jnp.asarray(du), factors)
+    def _taped(self, step: Step) -> Callable[[Any, Any], Any]:
+        taken = jax.custom_vjp(lambda u, p: jnp.asarray(step.after))
+        taken.defvjp(lambda u, p: (jnp.asarray(step.after), TapedStep(u, p, step)), self._backward)
+        return taken
 
     def _backward(self, kept: TapedStep, u_bar: Any) -> tuple[Any, Any]:
-        w = self.model.solve_transposed(kept.factors, -np.asarray(u_bar))
+        w = self.model.solve_transposed(kept.step.factors, -kept.step.a * np.asarray(u_bar))
         by_u, by_p = self._pullback(kept.u, kept.p, kept.du, w)
         return u_bar + by_u, by_p

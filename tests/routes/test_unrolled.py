@@ -10,11 +10,12 @@ from conftest import relative_error, somewhere
 
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
-from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.jax64 import jax
-from gradient_routes.problems.problem import Array
+from gradient_routes.problems.errors import InputError, NotConverged
+from gradient_routes.problems.jax64 import jax, jnp
+from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
 from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import ForwardWork
 from gradient_routes.routes.solvers.traced_iterations import iteration, solution
 from gradient_routes.routes.unrolled_ad import KEPT, unrolled_ad
 
@@ -166,6 +167,87 @@ def test_the_newton_loop_gives_the_gradient_of_the_kth_newton_iterate(k: int) ->
     assert relative_error(result.gradient, exact) < 1e-11  # cond(R_u) eps of two solvers
     solution = implicit_ad.prepare(Model(block), p)(p).gradient
     assert relative_error(result.gradient, solution) > (1e-3, 1e-5, 1e-9)[k - 1]
+
+
+class Arctan(Problem):
+    """R = arctan(s (u - p)), J = u^2/2: full Newton steps from afar fly apart, the line search halves them."""
+
+    name = "arctan"
+    offers = Offers.LINEARIZE | Offers.TRACE
+    n_state = 2
+    parameters = Parameters(start=np.array([2.0, -3.0]), scale=np.ones(2))
+    s = np.array([1.0, 2.0])
+
+    def residual(self, u: Array, p: Array, xp=np) -> Array:
+        return xp.arctan(self.s * (u - p))
+
+    def tangent(self, u: Array, p: Array) -> Array:
+        return np.diag(self.s / (1.0 + (self.s * (u - p)) ** 2))
+
+    def objective(self, u: Array, p: Array) -> float:
+        return 0.5 * u @ u
+
+    def linearize(self, u: Array, p: Array) -> Linearization:
+        return Linearization(-self.tangent(u, p), u, np.zeros(2))
+
+    def traced(self) -> Traced:
+        return Traced(lambda u, p: self.residual(u, p, jnp), self.objective)
+
+
+def test_the_tape_has_the_step_lengths_of_the_forward_solve() -> None:
+    problem = Arctan()
+    p, model = problem.parameters.start, Model(problem)
+    state = model.solve(p)
+    assert state.work.residuals > state.work.newton_iterations + 1  # steps were halved
+    k = unrolled_ad.resolve(model, p, **OPEN)["iterations"]
+    gradient = unrolled_ad.prepare(model, p, inner="direct", iterations=k)
+    before = model.tally.work
+    result = gradient(p)
+    np.testing.assert_array_equal(result.u, state.u)
+    assert result.residual == state.residual
+    assert relative_error(result.gradient, p) < 1e-9
+    counted = model.tally.work - before
+    assert counted == unrolled_ad.cost(
+        2, ForwardWork(state.work, linear=False), **OPEN | {"inner": "direct", "iterations": k}
+    )
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_the_gradient_of_an_iterate_of_damped_steps_is_that_of_a_difference(k: int) -> None:
+    problem = Arctan()
+    p = problem.parameters.start
+    iterates = unrolled_ad.prepare(Model(problem), p, inner="direct", iterations=k)
+    lengths = [step.a for step in Model(problem).newton_iterates(p, k)[0]]
+    assert min(lengths) < 1.0
+
+    def u_k(q: np.ndarray) -> np.ndarray:
+        u = np.zeros(2)
+        for a in lengths:
+            u = u - a * np.linalg.solve(problem.tangent(u, q), problem.residual(u, q))
+        return u
+
+    h = 1e-6
+    fd = [(u_k(p + h * e) @ u_k(p + h * e) - u_k(p - h * e) @ u_k(p - h * e)) / (4 * h) for e in np.eye(2)]
+    assert relative_error(iterates(p).gradient, np.array(fd)) < 1e-7
+    np.testing.assert_allclose(iterates(p).u, u_k(p), rtol=1e-13)
+
+
+def test_a_block_pressed_by_damped_steps_has_the_gradient_of_its_solution() -> None:
+    block = Block(n=2, traction=-1.0)
+    p, model = block.parameters.start, Model(block)
+    state = model.solve(p)
+    assert state.work.residuals > state.work.newton_iterations + 1
+    result = unrolled_ad.prepare(model, p, inner="direct", iterations=state.work.newton_iterations)(p)
+    np.testing.assert_array_equal(result.u, state.u)
+    assert relative_error(result.gradient, implicit_ad.prepare(Model(block), p)(p).gradient) < 1e-8
+
+
+def test_an_iteration_that_gets_stuck_has_no_gradient() -> None:
+    """Beyond the load that this block bears the line search finds no step, nor does the tape."""
+    block = Block(n=2, traction=-3.0)
+    p = block.parameters.start
+    with pytest.raises(NotConverged, match=r"block: not converged in . steps: \|R\| / \|R_0\| = "):
+        unrolled_ad.prepare(Model(block), p, inner="direct", iterations=40)(p)
 
 
 def test_the_tape_of_the_newton_loop_holds_the_factors_of_every_step() -> None:
