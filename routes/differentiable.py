@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.jax64 import jax, jnp
+from gradient_routes.problems.problem import Array
 from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 
 
 class Solved:
-    """A solved state on JAX's tape: its arrays u, p are leaves, its factors are a constant."""
+    """A solved state on JAX's tape: its arrays u, p are leaves, its factors are a constant; lam once it is known."""
 
     def __init__(self, state: State) -> None:
         self.state = state
+        self.lam: Array | None = None
 
 
 jax.tree_util.register_pytree_node(
@@ -51,6 +53,7 @@ def differentiable_solve(
 
     def backward(solved: Solved, u_bar: Any) -> tuple[Any]:
         lam = LinearizedSolver(model, solved.state, factors).solve_transposed(-np.asarray(u_bar))
+        solved.lam = lam
         return (R_p_transposed(solved.state.u, solved.state.p, lam),)
 
     solve.defvjp(forward, backward)

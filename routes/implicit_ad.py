@@ -31,7 +31,8 @@ def implicit_ad(model: Model, p: Array, *, factors: Factors = "refined") -> Grad
 
     def gradient(p: Array) -> Result:
         J, pullback = jax.vjp(lambda p: objective(solve(p), p), p)
-        state = solved.pop().state
-        return Result(float(J), np.asarray(pullback(1.0)[0]), state.u, state.residual, tape=held_bytes(pullback))
+        node, tape = solved.pop(), held_bytes(pullback)
+        dJ_dp = np.asarray(pullback(1.0)[0])
+        return Result(float(J), dJ_dp, node.state.u, node.state.residual, node.lam, tape)
 
     return gradient

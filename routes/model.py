@@ -206,6 +206,17 @@ class Model:
         least = rounding(u, state.factors.norm, self.problem.offset)
         return max(self.solver.rtol, least / state.scale if state.scale else least)
 
+    def adjoint_residual(self, u: Array, lam: Array, p: Array) -> tuple[float, float]:
+        """|R_u^T lam + J_u|_inf and |J_u|_inf, R_u assembled at u. Not counted."""
+        problem = self.problem
+        if Offers.PARTIALS in problem.offers:
+            J_u = problem.linearize(u, p).J_u
+        else:
+            from gradient_routes.problems.jax64 import jax
+
+            J_u = np.asarray(jax.grad(self.traced.objective)(u, p))
+        return norm(problem.tangent(u, p).T @ lam + J_u), norm(J_u)
+
     def value(self, p: Array) -> float:
         """J(p) by one forward solve, or by the `value` of a black box."""
         if Offers.SOLVE in self.problem.offers:

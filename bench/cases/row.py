@@ -36,6 +36,7 @@ COLUMNS = (
     Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2, where judged in directions V: of V^T g"),
     Column("reference", "TEXT", "", "where g_ref comes from"),
     Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved by the forward solve"),
+    Column("adjoint_residual", "REAL", "1", "|R_u^T lam + J_u|_inf / |J_u|_inf achieved by the adjoint solve"),
     Column("linear_solver", "TEXT", "", "factorization behind the forward solve"),
     Column("prepare_s", "REAL", "s", "preparation: imports, mesh, symbolic analysis, compilation"),
     Column("first_s", "REAL", "s", "first call of the gradient"),

@@ -25,7 +25,7 @@ from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Judge, KnownJudges, norm2
-from gradient_routes.bench.execution.solved import rounding, unsolved
+from gradient_routes.bench.execution.solved import adjoint, rounding, unsolved
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
@@ -155,6 +155,10 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
     begin("judgement")
     reason = unsolved(context, route, result)
     if reason is None and (why := rounding(context, result)) is not None:
+        record.note(f"{route.name}: {why}")
+    adjoint_residual, why = adjoint(context, result)
+    record.add({"adjoint_residual": adjoint_residual})
+    if why is not None:
         record.note(f"{route.name}: {why}")
     _judge(context, route, record, np.asarray(result.gradient))
     begin("the counting of its work")

@@ -1,4 +1,4 @@
-"""Whether the gradient of a route belongs to a solved state, measured: R at the state that the route returns."""
+"""Whether the gradient of a route belongs to a solved state and a solved adjoint, measured at what it returns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import State, norm
+from gradient_routes.routes.newton import ROUNDING, State, norm
 from gradient_routes.routes.route import Result, Route
 
 APART = 10.0  # Newton corrections: two states further apart are not approximations of one
@@ -42,6 +42,19 @@ def rounding(context: CaseContext, result: Result) -> str | None:
     if result.residual is None or not result.residual > rtol:
         return None
     return f"|R| / |R_0| = {result.residual:.2g} is rounding of R, rtol {rtol:g} is out of reach"
+
+
+def adjoint(context: CaseContext, result: Result) -> tuple[float | None, str | None]:
+    """|R_u^T lam + J_u| / |J_u| where a route returns lam, and a note where it exceeds adjoint_rtol and rounding."""
+    state = context.price()[1]
+    if state is None or result.lam is None or result.u is None:
+        return None, None
+    model, lam = context.model(), np.asarray(result.lam)
+    left, J_u = model.adjoint_residual(np.asarray(result.u), lam, context.p)
+    rtol, found = model.solver.adjoint_rtol, left / (J_u or 1.0)
+    if left <= max(rtol * J_u, ROUNDING * state.factors.norm * norm(lam)):
+        return found, None
+    return found, f"|R_u^T lam + J_u| / |J_u| = {found:.2g}, wanted {rtol:g}: the adjoint is not solved"
 
 
 def _elsewhere(model: Model, route: Route, u: Array, state: State) -> str | None:

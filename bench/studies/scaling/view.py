@@ -17,6 +17,7 @@ from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.studies.scaling import break_even_view as break_even
 from gradient_routes.bench.studies.scaling import growth_view as growth
 from gradient_routes.bench.studies.scaling.climbing import Series as Routes
+from gradient_routes.bench.studies.scaling.growing_error import growing
 from gradient_routes.bench.studies.scaling.measure import Scaling, abscissa, abscissas, iterated, value
 from gradient_routes.routes.tally import Work
 
@@ -35,6 +36,9 @@ def show(out: Console, done: Scaling, plotted: bool = True) -> None:
     if done.growths:
         _section(out, "how it grows", growth.table(done), growth.legend(done))
     _section(out, "the largest size under the caps", reached(done))
+    for series in done.series:
+        for said in growing(done.sizes, series):
+            out.print(Text(f"note: {name(series)}: {said}", style="italic"), soft_wrap=not out.is_terminal)
     if done.break_evens:
         _section(out, break_even.title(done), break_even.table(done.break_evens), break_even.LEGEND)
         tables.show(out, break_even.lines(done.break_evens))

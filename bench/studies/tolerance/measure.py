@@ -22,9 +22,9 @@ from gradient_routes.bench.execution.cost_model import Prices, prices, unafforda
 from gradient_routes.bench.studies.judged import Bench, said
 from gradient_routes.bench.studies.options import one_problem, routes_of
 from gradient_routes.problems.errors import InputError, RoutesError
-from gradient_routes.problems.problem import Array, Offers, Problem
+from gradient_routes.problems.problem import Offers, Problem
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import Solver, norm
+from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Options, Result, Route
 from gradient_routes.routes.solvers.iterative import descent, krylov
 from gradient_routes.routes.solvers.registry import linear_solver as named
@@ -255,9 +255,8 @@ class Experiment:
     def _adjoint_residual(self, result: Result) -> float | None:
         if result.lam is None or result.u is None:
             return None
-        J_u: Array = self.problem.linearize(result.u, self.p).J_u
-        left = self.problem.tangent(result.u, self.p).T @ result.lam + J_u
-        return norm(left) / norm(J_u) if J_u.any() else norm(left)
+        left, J_u = Model(self.problem).adjoint_residual(result.u, result.lam, self.p)
+        return left / (J_u or 1.0)
 
     def _unaffordable(self, route: Route, options: Options) -> str | None:
         """Why the sweep is not paid for, all of it at the price of the tightest tolerance that can be met."""
