@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.problem import Array
-from gradient_routes.routes.imaginary import RELATIVE_STEP, refuse_losses
+from gradient_routes.routes.imaginary import RELATIVE_STEP, refuse_losses, refuse_zeros
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import ForwardWork, Gradient, Offers, Result, Work, route
 
@@ -22,8 +22,10 @@ def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
 def complex_step(model: Model, p: Array) -> Gradient:
     """dJ/dp_i = Im J(p + i h e_i) / h,  h = 1e-30 scale_i (1e-30 |p_i| where that is less).
 
-    R and J are tested first, at a state whose solve is not counted. Raises LostImaginaryPart.
+    R and J are tested first, at a state whose solve is not counted, and components that are exactly 0 once, by solves
+    that are not counted. Raises LostImaginaryPart.
     """
+    tested: list[bool] = []
     refuse_losses(model.problem, Model(model.problem, model.solver).solve(p).u, p)
     scale = model.parameters.scale
 
@@ -34,6 +36,9 @@ def complex_step(model: Model, p: Array) -> Gradient:
             q[i] += 1j * h
             J = model.solve(q, polish=POLISH).J
             g[i] = J.imag / h
+        if not tested:
+            refuse_zeros(model.problem, Model(model.problem, model.solver).value, p, g)
+            tested.append(True)
         return Result(float(J.real), g)
 
     return gradient

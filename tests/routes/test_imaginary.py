@@ -163,6 +163,79 @@ def test_the_complex_step_refuses(kind: type[Duffing]) -> None:
     assert "\n" not in str(told.value)
 
 
+def softplus(x: Array) -> Array:
+    """By np.logaddexp, which takes no complex numbers."""
+    return np.logaddexp(0.0, x.real)
+
+
+FAINT = {
+    "softplus": lambda p: softplus(10.0 * (p - 1.0)).sum(),
+    "absolute": lambda p: np.abs(p) @ np.abs(p),
+    "cast": lambda p: float(p[-1].real),
+    "conjugating": lambda p: np.vdot(p[-1], p[-1]).real,
+}
+
+
+class Faint(Duffing):
+    """A third parameter, which J sees only through a small term; it has an offset, beside which this is nothing."""
+
+    def __init__(self, term) -> None:
+        super().__init__()
+        base = self.parameters
+        self.parameters = replace(
+            base, start=np.append(base.start, 0.7), scale=np.append(base.scale, 1.0), label=lambda i: f"p_{i + 1}"
+        )
+        self.term = term
+
+    def residual(self, u: Array, p: Array) -> Array:
+        return super().residual(u, p[:2])
+
+    def tangent(self, u: Array, p: Array) -> Array:
+        return super().tangent(u, p[:2])
+
+    def objective(self, u: Array, p: Array) -> Array:
+        return super().objective(u, p[:2]) + 1e3 * p[0] + 2e-4 * self.term(p[2:])
+
+
+@pytest.mark.parametrize("term", FAINT)
+def test_a_slope_that_is_exactly_zero_where_J_varies_is_refused_once(term: str) -> None:
+    """Too faint beside other slopes for a random direction through all parameters to show it."""
+    problem = Faint(FAINT[term])
+    p = problem.parameters.start
+    assert lost(problem, p) == {}
+    gradient = complex_step.prepare(Model(problem), p)
+    said = r"^duffing: complex step lost: Im J is exactly 0 for p_3, a difference is .* - use no"
+    with pytest.raises(LostImaginaryPart, match=said):
+        gradient(p)
+
+
+def test_parameters_that_J_does_not_depend_on_are_no_loss() -> None:
+    for problem in (Faint(lambda p: 0.0), Bar(), Bar(stop="penalty", gap=2.0)):
+        p, model = problem.parameters.start, Model(problem)
+        gradient = complex_step.prepare(model, p)
+        g = gradient(p).gradient
+        assert (g == 0.0).any()
+        work = model.tally.work.forward_solves
+        np.testing.assert_array_equal(gradient(p).gradient, g)
+        assert model.tally.work.forward_solves == 2 * work == 2 * len(p)
+
+
+def test_a_component_of_R_that_drops_them_beside_large_ones_is_found() -> None:
+    class Beside(Duffing):
+        """The third row of R is in other units, and its cubic spring is cast."""
+
+        def residual(self, u: Array, p: Array) -> Array:
+            R = super().residual(u, p) * 1e7
+            R[2] = super().residual(u.real, p.real)[2]
+            return R
+
+        def tangent(self, u: Array, p: Array) -> Array:
+            return super().tangent(u, p) * np.where(np.arange(len(u)) == 2, 1.0, 1e7)[:, None]
+
+    found = lost(Beside(), somewhere(Duffing()))
+    assert found["residual"].endswith("of 1 of its 4 components")
+
+
 @pytest.mark.parametrize("problem", [Bar(), Block(n=2)], ids=lambda problem: problem.name)
 def test_the_test_is_not_counted(problem: Problem) -> None:
     p = problem.parameters.start
