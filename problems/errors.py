@@ -25,6 +25,10 @@ class LostImaginaryPart(RoutesError):
     """R or J of a problem that offers COMPLEX drops the imaginary part of its arguments."""
 
 
+class LowPrecision(RoutesError):
+    """An array of a problem has fewer digits than float64, or is no array of numbers."""
+
+
 class SingularMatrix(RoutesError):
     """A matrix that had to be factorized is singular, or not positive definite although it should be."""
 

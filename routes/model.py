@@ -14,13 +14,17 @@ from gradient_routes.problems.problem import Array, Linearization, Offers, Param
 from gradient_routes.routes.load_stepping import by_load_steps
 from gradient_routes.routes.newton import Solver, State, System, newton, norm, rounding, unwatched
 from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact, Operations, Recorded, Step
+from gradient_routes.routes.precision import double, double_operator
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.tally import Tally
 
 
 class Model:
-    """A problem that can be solved, with its work counted in `tally`, its own or the one given."""
+    """A problem that can be solved, with its work counted in `tally`, its own or the one given.
+
+    Its arrays are float64 or complex128: what a problem gives as integers is converted. Raises LowPrecision for others.
+    """
 
     def __init__(self, problem: Problem, solver: Solver | None = None, tally: Tally | None = None) -> None:
         self.problem = problem
@@ -35,15 +39,27 @@ class Model:
     @cached_property
     def traced(self) -> Traced:
         """R and J in jax.numpy: one object, so that JAX reuses what it has compiled."""
-        return self.problem.traced()
+        from gradient_routes.problems.jax64 import jax
+
+        traced, p = self.problem.traced(), self.parameters.start
+        u = self.initial(p)
+        for name, f in (("traced R", traced.residual), ("traced J", traced.objective)):
+            double(np.empty(0, jax.eval_shape(f, u, p).dtype), name, self._who)
+        return traced
+
+    def initial(self, p: Array) -> Array:
+        return double(self.problem.initial(p), "u_0", self._who)
+
+    def objective(self, u: Array, p: Array) -> Any:
+        return double(self.problem.objective(u, p), "J", self._who)[()]
 
     def residual(self, u: Array, p: Array) -> Array:
         self.tally.count("residuals")
-        return self.problem.residual(u, p)
+        return double(self.problem.residual(u, p), "R", self._who)
 
     def tangent(self, u: Array, p: Array) -> Any:
         self.tally.count("assemblies")
-        return self.problem.tangent(u, p)
+        return double_operator(self.problem.tangent(u, p), "R_u", self._who)
 
     def factorize(self, A: Any) -> Factorization:
         self.tally.count("factorizations")
@@ -51,7 +67,7 @@ class Model:
 
     def matvec(self, A: Any, v: Array) -> Array:
         self.tally.count("matvecs")
-        return np.asarray(A @ v)
+        return double(A @ v, "R_u v", self._who)
 
     def solve_linear(self, factors: Factorization, b: Array) -> Array:
         """R_u^{-1} b."""
@@ -83,17 +99,19 @@ class Model:
     def noise(self, state: State) -> float:
         """|dJ| by one more full Newton step from a solved state: about the error that the tolerance leaves in J."""
         du = self.solve_linear(self.factors_at(state), self.residual(state.u, state.p))
-        return float(abs(self.problem.objective(state.u - du, state.p) - state.J))
+        return float(abs(self.objective(state.u - du, state.p) - state.J))
 
     def tangent_operator(self, state: State) -> Any:
         """R_u at a solved state for products only: matrix-free where the problem can, else assembled."""
         if self.problem.matrix_free:
-            return self.problem.tangent_operator(state.u, state.p)
+            return double_operator(self.problem.tangent_operator(state.u, state.p), "R_u", self._who)
         return self.tangent(state.u, state.p)
 
     def linearize(self, state: State) -> Linearization:
         """R_p, J_u, J_p at a solved state. Not counted: they cost about as much as a residual."""
-        return self.problem.linearize(state.u, state.p)
+        lin, who = self.problem.linearize(state.u, state.p), self._who
+        R_p = double_operator(lin.R_p, "R_p", who)
+        return Linearization(R_p, double(lin.J_u, "J_u", who), double(lin.J_p, "J_p", who))
 
     def solve(
         self, p: Array, start: State | None = None, factors: Factorization | None = None, polish: int = 0
@@ -107,7 +125,7 @@ class Model:
         polish = 0 if self.problem.linear else max(polish, self.solver.polish)
         before = self.tally.work
         self.tally.count("forward_solves")
-        u = self.problem.initial(p) if start is None else start.u.astype(p.dtype)
+        u = self.initial(p) if start is None else start.u.astype(p.dtype)
         scale = None if start is None else start.scale
         try:
             steps = self._direction(p, start, factors)
@@ -120,7 +138,7 @@ class Model:
             u = by_load_steps(lambda t, u: self._newton(u, p, norm(load), steps, (1.0 - t) * load)[0], u, self._who)
             u, history, scale = self._newton(u, p, norm(load), steps, polish=polish)
         assert steps.factors is not None  # at least one step was taken
-        J = self.problem.objective(u, p)
+        J = self.objective(u, p)
         return State(p, u, J, history, scale, steps.factors, self.tally.work - before, steps.rate)
 
     def newton_iterates(self, p: Array, k: int) -> tuple[list[Step], float]:
@@ -132,7 +150,7 @@ class Model:
         self.tally.count("forward_solves")
         steps = Recorded(self._operations(p))
         try:
-            self._newton(self.problem.initial(p), p, None, steps, polish=k, at_most=k, taken=steps.taken)
+            self._newton(self.initial(p), p, None, steps, polish=k, at_most=k, taken=steps.taken)
         except NotConverged as end:
             if len(steps.steps) < k:
                 raise
@@ -195,7 +213,7 @@ class Model:
 
     def relative_residual(self, u: Array, p: Array) -> float:
         """|R(u, p)|_inf / |R(u_0, p)|_inf of a state that another solver found: two residuals."""
-        scale = norm(self.residual(self.problem.initial(p), p))
+        scale = norm(self.residual(self.initial(p), p))
         return norm(self.residual(u, p)) / (scale or 1.0)
 
     def tolerance(self, u: Array, state: State) -> float:
@@ -222,4 +240,4 @@ class Model:
         if Offers.SOLVE in self.problem.offers:
             return float(self.solve(p).J)
         self.tally.count("forward_solves")
-        return float(self.problem.value(p))
+        return float(double(self.problem.value(p), "J", self._who))

@@ -123,7 +123,7 @@ def resolve(
         from gradient_routes.routes.solvers.traced_iterations import iteration
 
         iterate = iteration(inner, model.traced)
-        points = [problem.initial(p)] + ([] if state is None else [near(problem, state.u)])
+        points = [model.initial(p)] + ([] if state is None else [near(problem, state.u)])
         at_most, iterations = 64, 0
         while True:
             at_most *= 4
@@ -187,7 +187,7 @@ def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, 
     from gradient_routes.routes.differentiable import held_bytes
     from gradient_routes.routes.solvers.traced_iterations import count_products, iteration, solution
 
-    iterate, u_0 = iteration(inner, model.traced), model.problem.initial(p)
+    iterate, u_0 = iteration(inner, model.traced), model.initial(p)
     what = f"{k} {inner} iterations" + (f" in each of {newton} Newton steps" if newton > 1 else "")
 
     def objective(p: Any) -> tuple[Any, Any]:

@@ -32,12 +32,12 @@ from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
+from gradient_routes.routes.precision import HOW
 from gradient_routes.routes.route import Options, Result, Route
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
 SMALL = 1e-6  # relative residual of a state that counts as converged
 WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
-FLOAT64 = "compute in float64 (JAX: jax.config.update('jax_enable_x64', True), PyTorch: dtype=torch.float64)"
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def _checked(context: CaseContext, route: Route, result: Result, record: Record)
         raise Failure(f"{route.name}: gradient of complex numbers - return the real dJ/dp")
     given = np.asarray(result.gradient).dtype
     if given.kind == "f" and given.itemsize < 8:
-        record.note(f"{route.name}: gradient in {given}: {FLOAT64}")
+        record.note(f"{route.name}: gradient in {given}: {HOW}")
     g = np.asarray(result.gradient, dtype=np.float64)
     if g.shape != context.p.shape:
         raise Failure(f"{route.name}: gradient of shape {g.shape} for {len(context.p)} parameters - mend the route")
