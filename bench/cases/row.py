@@ -58,6 +58,8 @@ COLUMNS = (
     Column("work", "TEXT", "1", "work counted during one call", json=True),
     Column("predicted_work", "TEXT", "1", "work the route declares", json=True),
     Column("predicted_s", "REAL", "s", "declared work priced by one measured forward solve"),
+    Column("price_s", "REAL", "s", "that forward solve: wall time, the least of several"),
+    Column("price_cpu_s", "REAL", "s", "its CPU time, which is less where it waited, as on a busy machine"),
     Column("predicted_tape_bytes", "REAL", "byte", "tape the route declares"),
     Column("started", "TEXT", "UTC", "when the case began, ISO 8601"),
     Column("settings", "TEXT", "", "of the solver, and other options of the run that a gradient depends on", json=True),

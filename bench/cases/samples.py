@@ -6,9 +6,21 @@ from dataclasses import dataclass
 from statistics import median, quantiles
 
 LEAST = 5  # rounds, where --min-time asks for any repeats at all
-
-
 SPREAD = 0.10  # of the median, between the quartiles: beyond, a timing is not to be relied upon
+WAITED = 1.25  # wall time over CPU time: a call that took longer waited for a processor, or for something else
+
+
+@dataclass(frozen=True)
+class Elapsed:
+    """Seconds of one call: wall time, and CPU time of all threads and of child processes that have ended."""
+
+    wall: float
+    cpu: float
+
+    @property
+    def busy(self) -> bool:
+        """Whether the call waited, as it does on a loaded machine."""
+        return self.wall > WAITED * self.cpu
 
 
 @dataclass(frozen=True)

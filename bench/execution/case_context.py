@@ -12,6 +12,7 @@ from gradient_routes.bench.cases.case import ProblemSpec, point
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.outcome import Sensitivities, View
 from gradient_routes.bench.cases.partial import Partial
+from gradient_routes.bench.cases.samples import Elapsed
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cost_model import Prices, prices, unaffordable
 from gradient_routes.bench.execution.references import Judge, Judges, KnownJudges
@@ -27,17 +28,22 @@ from gradient_routes.routes.tally import Work
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a route will cost: wall time, bytes of tape, work; and why it exceeds the budget, None where it does not."""
+    """What a route will cost: wall time, bytes of tape, work, the forward solve it is priced by; and why it exceeds the
+    budget, None where it does not.
+    """
 
     seconds: float
     tape: float | None
     work: Work
+    price: Elapsed
     objection: str | None
 
     @property
     def columns(self) -> Row:
         return {
             "predicted_s": self.seconds,
+            "price_s": self.price.wall,
+            "price_cpu_s": self.price.cpu,
             "predicted_tape_bytes": self.tape,
             "predicted_work": asdict(self.work),
         }
@@ -81,8 +87,8 @@ class CaseContext:
     def predict(self, n_p: int, route: Route, options: Options) -> Prediction:
         work = route.cost(n_p, self.prices.declared, **options)
         tape = None if route.tape is None else route.tape(self.problem, **options)
-        seconds = self.prices.seconds(work)
-        return Prediction(seconds, tape, work, unaffordable(seconds, tape, work, self.settings.budget))
+        objection = unaffordable(self.prices, tape, work, self.settings.budget)
+        return Prediction(self.prices.seconds(work), tape, work, self.prices.forward, objection)
 
     def _unaffordable_reference(self, route: Route, n_p: int) -> str | None:
         return self.predict(n_p, route, route.defaults).objection

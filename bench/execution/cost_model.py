@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from statistics import median
+from operator import attrgetter
 from typing import Any
 
 from gradient_routes.bench.cases.machine import available_bytes
-from gradient_routes.bench.execution.timing import seconds_of
+from gradient_routes.bench.cases.samples import Elapsed
+from gradient_routes.bench.execution.timing import elapsed
 from gradient_routes.bench.units import duration, size
 from gradient_routes.problems.problem import Array, Offers
 from gradient_routes.routes.forward_work import ForwardWork
@@ -16,14 +18,15 @@ from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 from gradient_routes.routes.tally import Work
 
-SHORT, LONG = 1.0, 10.0  # [s] a first call includes compilation: 3 more calls are timed, beyond SHORT 1, LONG none
+TRIAL = 1.0  # [s] after the first call: as long as more calls are tried
+CALLS = 3  # after the first, on a machine that is idle
 
 
 @dataclass(frozen=True)
 class Prices:
-    """Seconds of a forward solve, of a substitution with its factors and of a product with R_u; its declared work."""
+    """A forward solve, seconds of a substitution with its factors and of a product with R_u; its declared work."""
 
-    forward: float
+    forward: Elapsed
     solve: float
     matvec: float
     declared: ForwardWork
@@ -37,15 +40,15 @@ class Prices:
         times = work.factorizations / cold.factorizations if cold.factorizations else work.forward_solves
         substitutions = work.solves + work.transposed_solves - times * cold.solves
         products = work.matvecs + work.residuals - times * (cold.matvecs + cold.residuals)
-        return times * self.forward + max(0.0, substitutions) * self.solve + max(0.0, products) * self.matvec
+        return times * self.forward.wall + max(0.0, substitutions) * self.solve + max(0.0, products) * self.matvec
 
 
 def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
     """Measure the prices at p; also return the state solved for them (None for a black box)."""
     problem = model.problem
     if Offers.SOLVE not in problem.offers:
-        seconds, _ = price_of(lambda: model.value(p))
-        return Prices(seconds, 0.0, 0.0, ForwardWork(Work(forward_solves=1))), None
+        forward, _ = price_of(lambda: model.value(p))
+        return Prices(forward, 0.0, 0.0, ForwardWork(Work(forward_solves=1))), None
     forward, state = price_of(lambda: model.solve(p))
     R_u = model.tangent_operator(state)
     declared = ForwardWork(
@@ -53,20 +56,28 @@ def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
     )
     solve, _ = price_of(lambda: state.factors.solve(state.u))
     matvec, _ = price_of(lambda: R_u @ state.u)
-    return Prices(forward, solve, matvec, declared), state
+    return Prices(forward, solve.wall, matvec.wall, declared), state
 
 
-def price_of(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Median seconds of the calls after the first one, unless that is too long, and the result."""
-    first, result = seconds_of(call)
-    repeats = 3 if first < SHORT else 1 if first < LONG else 0
-    return median([seconds_of(call)[0] for _ in range(repeats)] or [first]), result
+def price_of(call: Callable[[], Any]) -> tuple[Elapsed, Any]:
+    """The fastest of at least two calls, and the result. The first may include compilation; those after it go on for
+    TRIAL s while the machine is busy.
+    """
+    first, result = elapsed(call)
+    found = [elapsed(call)[0]]
+    wall = attrgetter("wall")
+    while math.fsum(map(wall, found)) < TRIAL and (len(found) < CALLS or min(found, key=wall).busy):
+        found.append(elapsed(call)[0])
+    return min(first, *found, key=wall), result
 
 
-def unaffordable(seconds: float, tape: float | None, work: Work, budget: float) -> str | None:
-    """Why a route is skipped for its predicted cost, in a sentence; None if it is not."""
+def unaffordable(own: Prices, tape: float | None, work: Work, budget: float, times: int = 1) -> str | None:
+    """Why a route is skipped for the predicted cost of `times` gradients, in a sentence; None if it is not."""
+    seconds = times * own.seconds(work)
     if seconds > budget:
-        return f"predicted bill {duration(seconds)} ({summary(work)}) > --budget {budget:g} s; --budget inf forces it"
+        priced = ", priced on a busy machine" if own.forward.busy else ""
+        bill = f"predicted bill {duration(seconds)} ({summary(work)}) > --budget {budget:g} s"
+        return f"{bill}{priced}; --budget inf forces it"
     memory = available_bytes()
     if budget != float("inf") and memory is not None and (tape or 0) > memory:
         return f"predicted tape {size(tape or 0)} > {size(memory)} of memory at hand; --budget inf forces it"

@@ -162,8 +162,8 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
         record.note(f"{route.name}: {why}")
     _judge(context, route, record, np.asarray(result.gradient))
     begin("the counting of its work")
-    _count(context, route, options, lambda: gradient(p), model, record)
-    rounds = Rounds(lambda: gradient(p), context.forward(), first_s, context.settings.min_time)
+    again_s = _count(context, route, options, lambda: gradient(p), model, record)
+    rounds = Rounds(lambda: gradient(p), context.forward(), min(first_s, again_s), context.settings.min_time)
     begin("timing")
     return Measurement(context, route, record, result, rounds if context.settings.timed else None, reason)
 
@@ -285,10 +285,10 @@ def _judge(context: CaseContext, route: Route, record: Record, g: Array) -> None
 
 def _count(
     context: CaseContext, route: Route, options: Options, gradient: Callable[[], Any], model: Model, record: Record
-) -> None:
-    """Count the work of one call and read its memory, apart from timing."""
+) -> float:
+    """Count the work of one call and read its memory, apart from timing. Returns the seconds that it took."""
     before = model.tally.work
-    peak, method = peak_of(gradient)
+    again_s, (peak, method) = seconds_of(lambda: peak_of(gradient))
     work = model.tally.work - before
     declared = route.cost(len(context.p), replace(context.prices.declared, counted=work), **options)
     record.add({"peak_bytes": peak, "memory_method": method})
@@ -303,6 +303,7 @@ def _count(
         record.add({"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)})
         with suppress(RoutesError):  # a state at which R_u is singular has no such numbers
             _note_state(context, route, options, model, state, record)
+    return again_s
 
 
 def _note_state(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from gradient_routes.bench.cases.samples import LEAST, Samples
+from gradient_routes.bench.cases.samples import LEAST, Elapsed, Samples
 
 LONG = 1.0  # [s] gradients that take longer are timed once, not repeated
 SAMPLE = 1e-3  # [s] of a sample: the clock and the call of a function are nothing beside it
@@ -23,6 +24,19 @@ def seconds_of(call: Callable[[], Any]) -> tuple[float, Any]:
     start = time.perf_counter()
     result = call()
     return time.perf_counter() - start, result
+
+
+def elapsed(call: Callable[[], Any]) -> tuple[Elapsed, Any]:
+    """Wall and CPU time of one call, and what it returned."""
+    start = _cpu()  # read outside the wall time: reading it takes longer than some calls do
+    wall, result = seconds_of(call)
+    return Elapsed(wall, _cpu() - start), result
+
+
+def _cpu() -> float:
+    """Of this process, and of its children that have ended."""
+    of = os.times()
+    return time.process_time() + of.children_user + of.children_system
 
 
 class Rounds:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.samples import Elapsed
 from gradient_routes.bench.store.store import Store
 
 State = Literal["missing", "failed", "stale", "done"]
@@ -15,8 +16,8 @@ OPEN: tuple[State, ...] = ("missing", "failed", "stale")
 def state_of(row: Row, kept: Row | None, expected: Callable[[Row], bool] = lambda row: False) -> State:
     """Of a case whose latest row is `kept`, None for none.
 
-    A skipped case waits for a larger budget, a pruned one for the smaller case to be tried again. One that failed as
-    it was expected to is done.
+    A skipped case waits for a larger budget, a pruned one for the smaller case to be tried again. A bill is stale where
+    it was priced on a busy machine, or where that is not known. One that failed as it was expected to is done.
     """
     if kept is None or kept["status"] == "pruned":
         return "missing"
@@ -24,8 +25,14 @@ def state_of(row: Row, kept: Row | None, expected: Callable[[Row], bool] = lambd
         return "stale"
     if kept["status"] == "skipped":
         more = kept["budget_s"] is not None and (row["budget_s"] is None or row["budget_s"] > kept["budget_s"])
-        return "missing" if more else "done"
+        return "missing" if more else "stale" if _doubtful(kept) else "done"
     return "done" if kept["status"] == "ok" or expected(kept) else "failed"
+
+
+def _doubtful(skipped: Row) -> bool:
+    """Whether a case was skipped for a bill whose price may be of a busy machine."""
+    wall, cpu = skipped["price_s"], skipped["price_cpu_s"]
+    return skipped["predicted_s"] is not None and (wall is None or cpu is None or Elapsed(wall, cpu).busy)
 
 
 def still_open(store: Store, states: tuple[State, ...], expected: Callable[[Row], bool]) -> Callable[[Row], bool]:

@@ -153,7 +153,7 @@ def why_not(ray: Ray, spec: RouteSpec, s: float | None, gradients: int, budget: 
     bill = prices(ray.model, p)[0]
     work = spec.route.cost(len(p), bill.declared, **options)
     tape = None if spec.route.tape is None else spec.route.tape(ray.problem, **options)
-    reason = unaffordable(gradients * bill.seconds(work), tape, work, budget)
+    reason = unaffordable(bill, tape, work, budget, gradients)
     return None if reason is None else f"{gradients} gradients: {reason}"
 
 

@@ -93,7 +93,7 @@ class Climb:
     def _prune(self, spec: ProblemSpec) -> None:
         """Not tried: what grows as it did between the last two sizes is over the budget here."""
         for series in self.live:
-            known = [(self.sizes.magnitude(of), row["seconds"]) for of, row in series.cases if measured(row)]
+            known = [(self.sizes.magnitude(of), row["seconds_min"]) for of, row in series.cases if measured(row)]
             if len(known) < 2:
                 continue
             predicted = extrapolated(known[-2], known[-1], self.sizes.magnitude(spec))

@@ -265,7 +265,7 @@ class Experiment:
         own = self._prices()
         work = len(self.sweep.pairs) * route.cost(len(self.p), own.declared, **options)
         tape = None if route.tape is None else route.tape(self.problem, **options)
-        return unaffordable(own.seconds(work), tape, work, self.budget)
+        return unaffordable(own, tape, work, self.budget)
 
     def _prices(self) -> Prices:
         if self._priced is None:

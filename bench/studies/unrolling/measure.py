@@ -255,11 +255,11 @@ class Unrolled:
         try:
             model, gradient = self._prepare(k, checkpoint)
             result, products = gradient(self.p), model.tally.work.matvecs
-            seconds, _ = price_of(lambda: gradient(self.p))
+            price, _ = price_of(lambda: gradient(self.p))
             errors = self.bench.errors(self.route, result)
         except Exception as failure:
             return Iterate(checkpoint, k, self.newton, "failed", said(failure))
-        measured = Iterate(checkpoint, k, self.newton, tape_bytes=result.tape, products=products, seconds=seconds)
+        measured = Iterate(checkpoint, k, self.newton, tape_bytes=result.tape, products=products, seconds=price.wall)
         return replace(measured, residual=result.residual, **errors)
 
     def _options(self, k: int, checkpoint: int | None) -> Options:
@@ -274,4 +274,4 @@ class Unrolled:
         own = self.bench.prices
         work = self.route.cost(len(self.p), own.declared, **options)
         tape = None if self.route.tape is None else self.route.tape(self.problem, **options)
-        return unaffordable(own.seconds(work), tape, work, self.budget)
+        return unaffordable(own, tape, work, self.budget)

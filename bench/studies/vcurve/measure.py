@@ -44,7 +44,7 @@ def run(
     plan = Plan(*steps, per_decade, few, directions, everywhere=True, budget=float("inf"), seed=seed)
     judged = subject(made, spec.route, spec.options, p, solver)
     with suppress(NotConverged, SingularMatrix):  # a solve that fails is part of the verdict
-        _refuse_beyond(budget, price_of(lambda: judged.objective(p))[0], plan)
+        _refuse_beyond(budget, price_of(lambda: judged.objective(p))[0].wall, plan)
     page_writable(html, kept, [selector, route, at])
     with stdout_to_stderr():
         found = check(judged, plan)

@@ -131,6 +131,14 @@ def test_states() -> None:
         (None, 5, "done"),
     ):
         assert state_of(kept(budget_s=now), kept(status="skipped", budget_s=before)) == state
+    for price, state in (
+        ({"price_s": 2.0, "price_cpu_s": 2.0}, "done"),
+        ({"price_s": 2.0, "price_cpu_s": 8.0}, "done"),  # of several threads
+        ({"price_s": 8.0, "price_cpu_s": 2.0}, "stale"),  # it waited three quarters of its time
+        ({}, "stale"),  # as kept before prices were
+    ):
+        assert state_of(row, kept(status="skipped", predicted_s=99.0, **price)) == state
+        assert state_of(row, kept(seconds=1.0, predicted_s=99.0, **price)) == "done"
 
 
 def content(monkeypatch: pytest.MonkeyPatch, **changed: object) -> str:
