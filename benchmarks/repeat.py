@@ -39,7 +39,8 @@ def repeat(problem: str, routes: Sequence[str], times: int = TIMES, min_time: fl
     ratios: dict[str, list[float]] = {}
     for _ in range(times):
         for outcome in run(case.problems([problem]), case.routes(routes), Settings(min_time=min_time), How()):
-            ratios.setdefault(outcome.row["route"], []).append(outcome.row["forward_ratio"])
+            assert outcome.samples is not None, outcome.row["reason"]
+            ratios.setdefault(outcome.row["route"], []).append(outcome.samples.ratio)
     return [Repeated(problem, route, tuple(found)) for route, found in ratios.items()]
 
 

@@ -27,9 +27,12 @@ def having(language: str) -> list[str]:
 
 
 def shape(text: str) -> list[list[str]]:
-    """A printed text without what changes from run to run: numbers, marks of unstable ones, the width of columns."""
-    text = text.replace("~", "").replace(", : unstable", "")
-    return [NUMBER.sub("#", line).split() for line in text.splitlines() if line.strip()]
+    """A printed text without what changes from run to run: numbers, marks of unstable ones, costs that are not
+    resolved and what is said of them, the width of columns.
+    """
+    text = text.replace("~", "").replace(", : unstable", "").replace(", priced on a busy machine", "")
+    lines = [line for line in text.splitlines() if line.strip() and "cost / forward solve unresolved" not in line]
+    return [NUMBER.sub("#", line.replace("unresolved", "1")).split() for line in lines]
 
 
 def reader(document: str, folder: Path) -> Path:

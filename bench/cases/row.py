@@ -49,7 +49,10 @@ COLUMNS = (
     Column("calls_per_sample", "INTEGER", "1", "gradients a sample is the mean of, so that the clock can tell them"),
     Column("interleaved", "INTEGER", "1", "cases on the problem whose rounds alternated, this one included"),
     Column("forward_s", "REAL", "s", "one forward solve, median over the same rounds"),
-    Column("forward_ratio", "REAL", "1", "gradient over forward solve, median of the rounds' quotients"),
+    Column(
+        "forward_ratio", "REAL", "1", "gradient over forward solve, median of the rounds' quotients; NULL: unresolved"
+    ),
+    Column("ratio_floor", "REAL", "1", "forward solves in the counted work, a bound below forward_ratio"),
     Column("peak_bytes", "INTEGER", "byte", "peak memory of one call above what was held before it"),
     Column("memory_method", "TEXT", "", "how peak_bytes was measured"),
     Column("factor_bytes", "INTEGER", "byte", "what the factors behind the forward solve hold"),

@@ -23,6 +23,13 @@ class Elapsed:
         return self.wall > WAITED * self.cpu
 
 
+def impossible(ratio: float, floor: float) -> bool:
+    """Whether a gradient came out cheaper than what its counted work contains, `floor` forward solves: by more than
+    SPREAD, or than one forward solve at all.
+    """
+    return ratio < (max(1.0, (1.0 - SPREAD) * floor) if floor > 1.0 else floor)
+
+
 @dataclass(frozen=True)
 class Samples:
     """Seconds of one call: each round's mean over `calls` gradients, and over forward solves."""
@@ -35,6 +42,10 @@ class Samples:
     def ratio(self) -> float:
         """Median of the rounds' quotients: what slows the machine down for a while slows both of a round down."""
         return median(g / f for g, f in zip(self.gradient, self.forward, strict=True))
+
+    def resolved(self, floor: float) -> float | None:
+        """The ratio; None where it is `impossible`."""
+        return None if impossible(self.ratio, floor) else self.ratio
 
     @property
     def quartiles(self) -> tuple[float, float]:

@@ -84,6 +84,12 @@ def unaffordable(own: Prices, tape: float | None, work: Work, budget: float, tim
     return None
 
 
+def contained(work: Work, declared: ForwardWork) -> float:
+    """How many cold forward solves are in counted work, operation by operation: a gradient cannot cost less."""
+    cold = vars(declared.cold)
+    return min((vars(work)[kind] / count for kind, count in cold.items() if count), default=0.0)
+
+
 LEGEND = "fwd forward solves, lin linearized solves, adj transposed solves, mv products with R_u"
 
 

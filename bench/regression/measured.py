@@ -16,7 +16,7 @@ from gradient_routes.problems.errors import InputError
 
 NAMES = ("problem", "problem_options", "route", "route_options", "at", "partial")
 NUMBERS = ("work", "gradient_error", "seconds", "peak_bytes", "tape_bytes", "factor_bytes", "predicted_s")
-HOW = ("reference", "memory_method", "unstable", "isolated", "threads", "budget_s")
+HOW = ("reference", "memory_method", "unstable", "ratio_floor", "isolated", "threads", "budget_s")
 DECLARED = ("problem_declared", "route_declared")
 KEPT = ("case_key", *NAMES, *DECLARED, "settings", "status", "reason", *NUMBERS, *HOW)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import comb, inf
 from statistics import median
 
+from gradient_routes.bench.cases.samples import impossible
 from gradient_routes.bench.regression.finding import Finding, Judgement
 from gradient_routes.bench.regression.machines import machine_differences
 from gradient_routes.bench.regression.measured import Case
@@ -50,6 +51,11 @@ class TimeRule:
         differences = machine_differences(base, new)
         if differences:
             return f"time, the machines differ: {'; '.join(differences)}"
+        for side, case in (("base", base), ("new", new)):
+            found, floor = median(case.ratios or [inf]), case.row["ratio_floor"]
+            if floor is not None and impossible(found, floor):
+                least = f"its counted work contains {number(floor)}"
+                return f"time, unresolved in {side}: {ratio(found)} forward solves, {least} - raise --min-time"
         n, m = len(base.ratios), len(new.ratios)
         if min(n, m) < ROUNDS:
             return f"time, of {n} and {m} rounds: too few, {ROUNDS} are needed - raise --min-time"

@@ -9,7 +9,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.row import ANSWERED, ENVIRONMENTS, STATUSES
 from gradient_routes.bench.execution.isolation.stack import without
 from gradient_routes.bench.render.figure import Figure, Note, Section, Table
-from gradient_routes.bench.render.format import number, ratio
+from gradient_routes.bench.render.format import cost, number
 from gradient_routes.bench.render.picking import doubt, grouped, in_order, tabulate, text
 from gradient_routes.bench.render.source import Source, schema
 
@@ -62,7 +62,7 @@ def matrix(cases: Sequence[Row]) -> Figure:
         "matrix",
         "Every problem by every route",
         "Cost of one gradient / forward solve, and its relative error; or what became of the case. ~: the time is"
-        " noisy, or less than the forward solve that it contains.",
+        " noisy; unresolved: the cost came out less than the forward solves that it contains.",
         Table.of(columns, rows),
     )
 
@@ -70,8 +70,10 @@ def matrix(cases: Sequence[Row]) -> Figure:
 def _cell(row: Row) -> str:
     if row["status"] != "ok":
         return str(row["status"])
-    cost = "ok" if row["forward_ratio"] is None else f"{'~' if doubt(row) else ''}{ratio(row['forward_ratio'])}×"
-    return f"{cost} · {number(row['gradient_error'], 1) or '?'}"
+    said = cost(row)
+    if row["forward_ratio"] is not None:
+        said = f"{'~' if doubt(row) else ''}{said}×"
+    return f"{said or 'ok'} · {number(row['gradient_error'], 1) or '?'}"
 
 
 def failures(source: Source) -> Section | None:

@@ -40,9 +40,8 @@ def in_order(selectors: Iterable[str]) -> list[str]:
 
 def doubt(row: Row) -> str | None:
     """Why the time of a case is not to be relied on."""
-    ratio, work = row["forward_ratio"], row["work"]
-    if ratio is not None and ratio < 1.0 and work is not None and work["forward_solves"] >= 1:
-        return "noise: less than the forward solve that it contains"
+    if row["forward_ratio"] is None and row["seconds"] is not None:
+        return "unresolved: less than the forward solves that it contains"
     return "noisy: quartiles more than 10 % of the median apart" if row["unstable"] else None
 
 

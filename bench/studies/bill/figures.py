@@ -19,7 +19,7 @@ FORWARD = Axis("forward_ratio", "cost of one gradient / forward solve", scale="l
 MEMORY = Axis("peak_bytes", "peak memory of one gradient", "byte", "log")
 TAPE = Axis("tape_bytes", "tape of AD", "byte", "log")
 DOUBT = text("doubt", "why its time is not to be relied on")
-HOLLOW = "Hollow: the time is noisy, or less than the forward solve that it contains."
+HOLLOW = "Hollow: the time is noisy, or less than the forward solves that it contains."
 GUIDES = (
     Guide("x", 1.0, "less than 1 forward solve", column="forward_ratio", below=True),
     Guide("y", RESOLUTION, "not resolved below 1 MiB", column="peak_bytes", below=True),

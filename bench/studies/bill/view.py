@@ -16,7 +16,7 @@ from gradient_routes.bench.cases.row import ANSWERED, measured
 from gradient_routes.bench.execution.cost_model import LEGEND as WORK
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.execution.isolation.stack import without
-from gradient_routes.bench.render.format import bytes_, number, ratio, seconds
+from gradient_routes.bench.render.format import bytes_, cost, number, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.tables import RESOLUTION, ends, left_out, named, say, titled
@@ -113,7 +113,7 @@ def _cells(row: Row) -> list[str]:
         number(row["objective"], 4),
         number(row["gradient_error"], 2) or "unknown",
         ("~" if row["unstable"] else "") + seconds(row["seconds"]) if row["status"] == "ok" else row["status"],
-        ratio(row["forward_ratio"]),
+        cost(row),
         _work(row["work"]),
         bytes_(row["peak_bytes"], RESOLUTION),
         bytes_(row["tape_bytes"]) + ("" if per_iteration is None else f" ({bytes_(per_iteration)}/it)"),

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.execution.cost_model import LEGEND, summary
-from gradient_routes.bench.render.format import bytes_, ratio, seconds
+from gradient_routes.bench.render.format import bytes_, cost, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
@@ -81,7 +81,7 @@ def bills(done: Scaling) -> Table:
 def _cells(row: Row, taped: bool) -> Iterator[str]:
     yield from ("" if row[key] is None else str(row[key]) for key in ("n_state", "n_param"))
     yield seconds(row["seconds"]) if row["status"] == "ok" else row["status"]
-    yield ratio(row["forward_ratio"])
+    yield cost(row)
     yield bytes_(row["peak_bytes"], tables.RESOLUTION)
     if taped:
         yield bytes_(row["tape_bytes"])

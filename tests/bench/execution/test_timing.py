@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import gc
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.samples import LEAST, Samples
 from gradient_routes.bench.execution import timing
+from gradient_routes.bench.execution.cost_model import contained
 from gradient_routes.bench.execution.executors import running
 from gradient_routes.bench.execution.executors.running import interleaved
 from gradient_routes.bench.execution.timing import LONG, MOST, TURNS, Rounds
+from gradient_routes.routes.forward_work import ForwardWork
+from gradient_routes.routes.tally import Work
 
 
 class Clock:
@@ -135,6 +140,64 @@ def test_quartiles_and_what_is_unstable() -> None:
     assert Samples((1.0, 1.0, 1.05, 1.11, 1.11), (1.0,) * 5).unstable is True
     assert Samples((1.0, 9.0, 1.0, 9.0), (1.0,) * 4).unstable is None, "too few to tell"
     assert Samples((7.0,), (1.0,)).quartiles == (7.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "floor", "impossible"),
+    [(0.58, 1.0, True), (0.99, 1.0, True), (1.0, 1.0, False), (1.2, 1.0, False), (0.58, 0.0, False), (0.58, 0.5, False),
+     (17.9, 18.0, False), (16.1, 18.0, True), (0.99, 1.05, True), (1.0, 1.05, False)],
+)  # fmt: skip
+def test_no_gradient_costs_less_than_the_forward_solves_it_contains(
+    ratio: float, floor: float, impossible: bool
+) -> None:
+    """A tenth less is within what a timing resolves, but for less than one solve."""
+    samples = Samples((ratio,) * 5, (1.0,) * 5)
+    assert samples.resolved(floor) == (None if impossible else ratio)
+
+
+def test_what_counted_work_contains_is_by_its_least_operation() -> None:
+    cold = ForwardWork(
+        Work(forward_solves=1, newton_iterations=4, residuals=5, assemblies=4, factorizations=4, solves=4)
+    )
+    adjoint = cold.cold + Work(assemblies=1, transposed_solves=1)
+    assert contained(adjoint, cold) == 1.0
+    assert contained(9 * cold.cold, cold) == 9.0
+    assert contained(cold.cold + Work(forward_solves=8, residuals=16, newton_iterations=8), cold) == 1.0, "chords"
+    assert contained(Work(forward_solves=1, matvecs=400), cold) == 0.0, "unrolled iterations are no forward solve"
+    assert contained(Work(), ForwardWork(Work(forward_solves=1))) == 0.0, "of a route that counts nothing"
+
+
+def fixed(monkeypatch: pytest.MonkeyPatch, *ratios: float) -> None:
+    """Every timing gives these."""
+    samples = Samples(ratios, (1.0,) * len(ratios))
+    monkeypatch.setattr(Rounds, "samples", property(lambda rounds: samples))
+
+
+def test_a_ratio_that_cannot_be_is_unresolved_wherever_it_is_shown(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The adjoint contains one forward solve, and unrolled conjugate gradients none."""
+    fixed(monkeypatch, 0.5, 0.58, 1.4, 0.5, 0.6)
+    command = ("run", "--min-time", "0", "--problem", "bar", "--route", "adjoint", "--route", "unrolled-ad")
+    adjoint, unrolled = cli(*command, "--json").rows
+    assert (adjoint["forward_ratio"], adjoint["ratio_floor"]) == (None, 1.0)
+    assert (unrolled["forward_ratio"], unrolled["ratio_floor"]) == (0.58, 0.0)
+    assert adjoint["note"].split("; ")[-1] == (
+        "adjoint: cost / forward solve unresolved, 0.58 in the median of 5 rounds, 1 by counted work: raise --min-time"
+    )
+    assert adjoint["seconds"] == 0.58
+    shown = cli(*command)
+    (line,) = [line for line in shown.out.splitlines() if line.startswith("  adjoint")]
+    assert "unresolved" in line
+    assert re.search(r"unrolled-ad.* 0\.58 1 fwd", shown.out)
+    assert cli("report", "-o", "page.html").code == 0
+    page = Path("page.html").read_text()
+    assert "unresolved ·" in page
+    assert "unresolved: less than the forward solves that it contains" in page
+    assert "0.58× ·" in page
+
+
+def test_what_is_not_timed_is_not_unresolved(cli) -> None:
+    ran = cli("run", "--no-timing", "--problem", "bar", "--route", "adjoint")
+    assert "unresolved" not in ran.out + ran.err
 
 
 class Fake:

@@ -194,6 +194,15 @@ def test_time_is_worse_by_ranks_and_by_a_factor() -> None:
     assert rule(case(ratios(1.05 * FACTOR)), base).judgement == "better"
 
 
+@pytest.mark.parametrize("side", ["base", "new"])
+def test_an_impossible_ratio_is_unresolved_and_compared_with_nothing(side: str) -> None:
+    sound, noisy = case(ratios(0.6), ratio_floor=1.0), case(ratios(0.29), ratio_floor=1.0)
+    found = TimeRule()(noisy, sound) if side == "base" else TimeRule()(sound, noisy)
+    assert found.judgement == "not-compared"
+    assert f"unresolved in {side}: 0.5" in found.says
+    assert TimeRule()(case(ratios(0.29)), case(ratios(0.29))).judgement == "same", "of counted work that is not known"
+
+
 def test_a_factor_that_ranks_do_not_confirm_is_noise() -> None:
     """Two of three rounds waited: the median says twice as slow, p = 0.005."""
     waited = [2.0] * 7 + [4.0] * 8

@@ -336,7 +336,7 @@ def test_lost_imaginary_parts_say_nothing_of_a_gradient(cli, tmp_path: Path, rou
 def test_rows_are_judged_by_another_and_say_why(cli, tmp_path: Path) -> None:
     (tmp_path / "my.py").write_text(CHAIN)
     routes = [part for name in ("adjoint", "fd-central", "complex-step") for part in ("--route", name)]
-    ran = cli("run", "--problem", "my.py:Chain", *routes, "--json")
+    ran = cli("run", "--problem", "my.py:Chain", *routes, "--json", "--no-timing")
     adjoint, differences, refused = ran.rows
     for row in (adjoint, differences):
         assert (row["reference"], row["note"]) == ("tangent", f"{row['route']}: {LOST}")
