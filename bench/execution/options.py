@@ -31,7 +31,12 @@ AFFINITY = "Processors to run on, as 0 or 0,2-3. [any]"
 KINDS = ("local", "dask")
 FEW = Whole(1, 4096)
 EXECUTOR = "Run on this machine or on a Dask cluster, one case at a time per worker (timed: per host)."
-SCHEDULER = "Address of the Dask scheduler, as tcp://HOST:8786. [a local cluster]"
+SCHEDULER = "Address of the Dask scheduler, as tls://HOST:8786. [a local cluster]"
+TLS = {
+    "--tls-ca-file": "Certificate in PEM format of the authority that signs for the cluster at --scheduler.",
+    "--tls-cert": "Certificate in PEM format by which that cluster knows you.",
+    "--tls-key": "Its key in PEM format. [in the file of --tls-cert]",
+}
 WORKERS = "Number of workers of a local Dask cluster. [1; with --no-timing one per processor]"
 JOBS = "Number of cases that run at the same time; more than 1 needs --no-timing."
 
@@ -78,25 +83,39 @@ def limit_options(what: str, timeout: float, last_words: float = 0.0) -> Callabl
 
 
 def executor_options(command: Command) -> Command:
-    """--executor, --scheduler, --workers, --jobs; the command gets how(isolate, limits, timed) as `executing`."""
+    """--executor, --scheduler, --tls-..., --workers, --jobs; the command gets how(isolate, limits, timed) as
+    `executing`.
+    """
 
     @wraps(command)
     def with_executor(
-        *, executor: Literal["local", "dask"], scheduler: str | None, workers: int | None, jobs: int, **others: Any
+        *,
+        executor: Literal["local", "dask"],
+        scheduler: str | None,
+        tls_ca_file: str | None,
+        tls_cert: str | None,
+        tls_key: str | None,
+        workers: int | None,
+        jobs: int,
+        **others: Any,
     ) -> Any:
+        tls = tls_ca_file, tls_cert, tls_key
         if executor == "local":
-            refuse_given(("scheduler", "workers"), "is of --executor dask")
+            refuse_given(("scheduler", "tls_ca_file", "tls_cert", "tls_key", "workers"), "is of --executor dask")
             return command(executing=lambda isolate, limits, timed: here(isolate, limits, timed, jobs), **others)
         refuse_given(("jobs",), "is of --executor local, a Dask cluster has workers")
         if scheduler is not None:
             refuse_given(("workers",), "of a cluster of this machine, not of one at --scheduler")
+        else:
+            refuse_given(("tls_ca_file", "tls_cert", "tls_key"), "of a cluster at --scheduler, this one makes its own")
         return command(
-            executing=lambda isolate, limits, timed: by_dask(isolate, limits, timed, scheduler, workers), **others
+            executing=lambda isolate, limits, timed: by_dask(isolate, limits, timed, scheduler, tls, workers), **others
         )
 
     options = (
         click.option("--executor", type=click.Choice(KINDS), default="local", show_default=True, help=EXECUTOR),
         click.option("--scheduler", metavar="ADDRESS", help=SCHEDULER),
+        *(click.option(name, type=click.Path(exists=True, dir_okay=False), help=says) for name, says in TLS.items()),
         click.option("--workers", type=FEW, metavar="N", help=WORKERS),
         click.option("--jobs", type=FEW, default=1, show_default=True, help=JOBS),
     )
@@ -119,7 +138,14 @@ def here(isolate: bool, limits: Limits, timed: bool, jobs: int) -> How:
     return How(isolate, limits, jobs)
 
 
-def by_dask(isolate: bool, limits: Limits, timed: bool, scheduler: str | None, workers: int | None) -> How:
+def by_dask(
+    isolate: bool,
+    limits: Limits,
+    timed: bool,
+    scheduler: str | None,
+    tls: tuple[str | None, str | None, str | None],
+    workers: int | None,
+) -> How:
     """On a cluster, which is joined or started when there is a first case. Raises InputError."""
     from gradient_routes.bench.execution.sweep import How
 
@@ -127,13 +153,17 @@ def by_dask(isolate: bool, limits: Limits, timed: bool, scheduler: str | None, w
         raise InputError("--executor dask: cases on its workers run in processes of their own - drop --no-isolate")
     if workers is not None and workers > 1 and timed:
         raise InputError(f"--workers {workers}: cases side by side spoil each other's timing - add --no-timing")
+    ca, cert, key = tls
+    if None in (ca, cert) and tls != (None, None, None):
+        raise InputError("--tls-ca-file, --tls-cert: go together - give both, and --tls-key")
     try:
         from gradient_routes.bench.execution.cluster.cluster import Cluster
-        from gradient_routes.bench.execution.cluster.joining import joined, local
+        from gradient_routes.bench.execution.cluster.joining import Credentials, joined, local
     except ImportError as error:
         raise InputError(f"--executor dask: {error} - pip install 'gradient-routes[dask]'") from error
     if scheduler is not None:
-        cluster = Cluster(lambda: joined(scheduler), timed, complain)
+        credentials = None if ca is None or cert is None else Credentials(ca, cert, key)
+        cluster = Cluster(lambda: joined(scheduler, credentials), timed, complain)
     else:
         count = workers or (1 if timed else max(1, processors() // limits.threads))
         cluster = Cluster(lambda: local(count), timed, complain)

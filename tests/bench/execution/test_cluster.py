@@ -20,14 +20,14 @@ from commands import ROOT, with_routes
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed: pip install 'gradient-routes[dask]'")
 
-from distributed import Client
+from distributed import Client, Security
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.outcome import Outcome
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.cluster.cluster import Cluster
 from gradient_routes.bench.execution.cluster.dispatch import Stranded
-from gradient_routes.bench.execution.cluster.joining import joined
+from gradient_routes.bench.execution.cluster.joining import joined, local
 from gradient_routes.bench.execution.cluster.remote import packed
 from gradient_routes.bench.execution.sweep import How, run
 
@@ -379,7 +379,66 @@ def test_a_scheduler_that_goes_is_told(folder: Path, monkeypatch: pytest.MonkeyP
         until(lambda: not any(alive(inside) for inside, _ in pids(folder)))
 
 
+def pem(folder: Path) -> dict[str, str]:
+    """Files of an authority, a certificate and its key, by the names that options of Dask and of this project have."""
+    made = Security.temporary()
+    folder.mkdir()
+    files = {"ca-file": made.tls_ca_file, "cert": made.tls_client_cert, "key": made.tls_client_key}
+    for name, content in files.items():
+        (folder / f"{name}.pem").write_text(content)
+    return {f"--tls-{name}": str(folder / f"{name}.pem") for name in files}
+
+
+def words(options: dict[str, str]) -> list[str]:
+    return [f"{name}={value}" for name, value in options.items()]
+
+
+def test_a_cluster_of_this_machine_refuses_who_has_no_credentials_of_it(tmp_path: Path, cli) -> None:
+    """Any user of the machine can connect to its port."""
+    with local(1) as client:
+        address = client.scheduler.address
+        assert address.startswith("tls://127.0.0.1:")
+        for security in (None, Security.temporary()):
+            with pytest.raises((OSError, TypeError)):
+                Client(address, timeout=PATIENCE, set_as_default=False, security=security)
+        with pytest.raises((OSError, RuntimeError)):
+            Client(address.replace("tls", "tcp"), timeout=3, set_as_default=False)
+        for options in ([], words(pem(tmp_path / "others"))):
+            ran = cli(*command("bar", *QUICK, *options, address=address))
+            assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+            assert ran.err.startswith(f"routes: --scheduler {address}: no Dask scheduler answers within 10 s (")
+            assert ran.err.endswith(" - give the --tls-ca-file, --tls-cert and --tls-key of its cluster\n")
+        assert client.submit(os.getpid).result(timeout=PATIENCE) != os.getpid(), "it works for whom it is for"
+
+
+def test_a_cluster_by_tls_takes_the_credentials_from_files(tmp_path: Path, cli) -> None:
+    """`dask scheduler` and `dask worker` call the same files by the same names."""
+    ours, file = pem(tmp_path / "ours"), tmp_path / "scheduler.json"
+    dask = ("--host", "127.0.0.1", "--no-dashboard", *words(ours))
+    with ExitStack() as stack:
+        at = ("--protocol", "tls", "--port", "0", "--scheduler-file", str(file))
+        stack.enter_context(started("distributed.cli.dask_scheduler", *at, *dask))
+        until(lambda: file.exists() and file.read_text().strip().endswith("}"))
+        address = json.loads(file.read_text())["address"]
+        stack.enter_context(started("distributed.cli.dask_worker", address, *dask, "--no-nanny"))
+        ran = cli(*command("bar[n=4]", *QUICK, *words(ours), address=address))
+        assert (ran.code, [row["status"] for row in ran.rows]) == (0, ["ok"]), ran.err
+        refused = cli(*command("bar[n=4]", *QUICK, *words(pem(tmp_path / "others")), address=address))
+        assert (refused.code, refused.out, refused.err.count("\n")) == (2, "", 1)
+
+
+def test_without_what_makes_certificates_it_is_said_how_to_install_it(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    ran = cli(*command("bar", *QUICK))
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert ran.err.endswith(" - pip install 'gradient-routes[dask]'\n")
+
+
 REFUSED = {
+    "--tls-cert=/dev/null": "--tls-cert: is of --executor dask - leave it out",
+    "--executor=dask --tls-cert=/dev/null": "--tls-cert: of a cluster at --scheduler, this one makes its own",
+    "--executor=dask --scheduler=tls://h:1 --tls-cert=/dev/null": "--tls-ca-file, --tls-cert: go together - give both",
+    "--executor=dask --scheduler=tls://h:1 --tls-ca-file=/dev/null --tls-cert=/dev/null": "--scheduler tls://h:1: no ",
     "--scheduler=tcp://h:1": "--scheduler: is of --executor dask - leave it out",
     "--workers=2": "--workers: is of --executor dask - leave it out",
     "--executor=dask --jobs=2": "--jobs: is of --executor local, a Dask cluster has workers - leave it out",
