@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from gradient_routes.bench.ranges import COUNT, FRACTION
-from gradient_routes.bench.sanitize import plain, unread
+from gradient_routes.bench.sanitize import echo, unread
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.solvers.registry import DEFAULT, points
 
@@ -115,7 +115,7 @@ def replaces(*suffixes: str) -> str:
 def complain(what: str) -> None:
     """Print one line on stderr, without line breaks and control characters of names in it."""
     try:
-        click.echo(f"routes: {plain(' '.join(what.split()))}", err=True)
+        echo(f"routes: {' '.join(what.split())}", err=True)
     except OSError:  # nobody reads it
         unread(sys.stderr)
 

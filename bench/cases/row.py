@@ -160,8 +160,8 @@ def stored(column: Column, value: Any) -> Any:
 
 
 def as_json(row: Row) -> str:
-    """One JSON object on one line."""
-    return json.dumps(clean(row), allow_nan=False)
+    """One JSON object on one line, of printable ASCII."""
+    return json.dumps(clean(row), allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def as_record(row: Row) -> tuple[Any, ...]:

@@ -11,6 +11,7 @@ import click
 
 from gradient_routes.bench.command_options import debug_option, replaces, store_option
 from gradient_routes.bench.ranges import Real
+from gradient_routes.bench.sanitize import echo
 
 if TYPE_CHECKING:
     from gradient_routes.bench.regression.compare import Comparison
@@ -96,11 +97,11 @@ def _write(found: Comparison, format: str, output: Output | None) -> None:
         if format == "table":
             show_comparison(console(), found)
         else:
-            click.echo(markdown(found) if format == "md" else as_json(found), nl=False)
+            echo(markdown(found) if format == "md" else as_json(found), nl=False)
     if output is not None:
         with output.open() as file:
             file.write(text.getvalue().encode("utf-8", "backslashreplace"))
-        click.echo(f"{conclusion(found)}; all of it in {output.path}")
+        echo(f"{conclusion(found)}; all of it in {output.path}")
 
 
 @click.command()
@@ -125,4 +126,4 @@ def baseline(output: Path, store: Path) -> None:
         file.write(as_text(found))
     counts = {"case": len(found.cases), "verdict": len(found.verdicts)}
     said = " and ".join(f"{n} {what}{'s' if n > 1 else ''}" for what, n in counts.items() if n)
-    click.echo(f"{said} of {store} in {output}")
+    echo(f"{said} of {store} in {output}")

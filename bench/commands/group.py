@@ -14,6 +14,7 @@ import click
 from gradient_routes.bench.cases.folder import from_here
 from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.bench.commands.interrupts import catching, over
+from gradient_routes.bench.sanitize import echo
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
@@ -48,12 +49,15 @@ class Routes(click.Group):
             about = error.ctx.command_path if error.ctx else "routes"
             complain(f"{error.format_message()} - see {about} --help")
             ctx.exit(WRONG_USAGE)
-        except (BrokenPipeError, click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
+        except click.ClickException as error:
+            complain(error.format_message())
+            ctx.exit(error.exit_code)
+        except (BrokenPipeError, click.exceptions.Exit, click.exceptions.Abort):
             raise  # click ends the process, quietly where the reader of a pipe has gone
         except (Exception, SystemExit) as failure:
             command = ctx.invoked_subcommand
             if debugging():
-                traceback.print_exc()
+                echo(traceback.format_exc(), err=True, nl=False)
             complain(said(failure, command))
             ctx.exit(code(failure, command))
 

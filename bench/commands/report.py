@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gradient_routes.bench.command_options import debug_option, replaces, store_option
+from gradient_routes.bench.sanitize import echo
 
 if TYPE_CHECKING:
     from gradient_routes.bench.store.store import Store
@@ -46,7 +47,7 @@ def report(output: Path | None, format: str | None, figures: Path | None, store:
         format = "md" if output.suffix.lower() in (".md", ".markdown") else "html"
     printed = format is not None and output in (None, Path("-"))
     for line in write(kept, output, format, figures):
-        click.echo(line, err=printed)
+        echo(line, err=printed)
 
 
 def _print(store: Store) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from gradient_routes.bench.command_options import debug_option, store_option
+from gradient_routes.bench.sanitize import echo
 
 
 @click.command()
@@ -45,7 +46,7 @@ def status(as_json: bool, store: Path) -> None:
     if as_json:
         found = standings(Store(store), EVERY)
         for each in found:
-            click.echo(json_line(each.row | {"state": each.aged or "current"}))
+            echo(json_line(each.row | {"state": each.aged or "current"}))
         return
     with uncollected():
         found = standings(Store(store))

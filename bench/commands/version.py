@@ -7,11 +7,13 @@ from pathlib import Path
 
 import click
 
+from gradient_routes.bench.sanitize import echo
+
 
 def print_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
     """The option's callback: print version, commit and Python, and exit."""
     if asked and not context.resilient_parsing:
-        click.echo(version())
+        echo(version())
         context.exit()
 
 

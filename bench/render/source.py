@@ -16,6 +16,7 @@ from gradient_routes.bench.cases.declared import kinds_of, undeclared
 from gradient_routes.bench.cases.registry import Kind
 from gradient_routes.bench.cases.row import COLUMNS
 from gradient_routes.bench.render.terminal.tables import asked
+from gradient_routes.bench.sanitize import plain
 from gradient_routes.bench.store.cases import IDS, cases, numbered
 from gradient_routes.bench.store.schema import tables as schema_tables
 from gradient_routes.bench.store.store import Store
@@ -99,15 +100,20 @@ def read(store: Store) -> Source:
     found = {name: newest(store.records(name), table.question) for name, table in declared.items()}
     named = {name: [_named(row, declared[name].columns) for row in rows] for name, rows in found.items()}
     return Source(
-        cases=shown,
+        cases=[_plain(row) for row in shown],
         kept=store.count(),
-        environments=store.records("environments"),
-        studies=store.records("studies"),
-        tables=named,
-        name=store.path.name,
+        environments=[_plain(row) for row in store.records("environments")],
+        studies=[_plain(row) for row in store.records("studies")],
+        tables={name: [_plain(row) for row in rows] for name, rows in named.items()},
+        name=plain(store.path.name),
         note=undeclared(every),
         counts=Counts.of(every),
     )
+
+
+def _plain(row: Row) -> Row:
+    """The row, no text of which has control characters: XML, SVG's language, knows none."""
+    return {name: plain(value) if isinstance(value, str) else value for name, value in row.items()}
 
 
 def thinned(rows: Sequence[Row], most: int = MOST) -> list[int]:

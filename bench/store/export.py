@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases.suggest import did_you_mean
+from gradient_routes.bench.sanitize import plain
 from gradient_routes.bench.store.frames import frame
 from gradient_routes.bench.store.output_files import Output, print_bytes
 from gradient_routes.bench.store.schema import tables
@@ -40,8 +41,9 @@ def export(store: Store, table: str, format: str, output: Path | None) -> None:
 
 def _write(file: Output | None, pieces: Iterator[bytes]) -> None:
     if file is None:
+        seen = sys.stdout.isatty()
         for piece in pieces:
-            print_bytes(piece)
+            print_bytes(plain(piece.decode()).encode() if seen else piece)
         return
     with file.open() as target:
         target.writelines(pieces)

@@ -14,7 +14,7 @@ from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.cases.study import Kept, Note, Study
 from gradient_routes.bench.command_options import FINISHED, complain, debugging
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
-from gradient_routes.bench.sanitize import plain, unread
+from gradient_routes.bench.sanitize import echo, echo_styled, plain, unread
 from gradient_routes.bench.store.keeping import apart
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.job import ExitCode, Printed
@@ -73,7 +73,7 @@ class Session:
                 if rows and not self.as_json:
                     self._print(click.style(plain(f"kept in {self.store.path}"), dim=True) + "\n")
         if debugging() and end.traceback:
-            click.echo(plain(end.traceback), err=True, nl=False)
+            echo(end.traceback, err=True, nl=False)
         finished = FINISHED if not self.lost and (rows or (self.study.keeps and not end.killed)) else None
         if end.status is Status.INTERRUPTED:
             complain(f"interrupted - {finished or 'nothing is kept'}")
@@ -91,7 +91,7 @@ class Session:
     def _print(self, text: str) -> None:
         """A reader who has gone ends nothing; nor does a full disk, which is said in the end."""
         try:
-            click.echo(text, nl=False)
+            echo_styled(text)
         except OSError as error:
             unread(sys.stdout)
             if not isinstance(error, BrokenPipeError):

@@ -19,6 +19,7 @@ from gradient_routes.bench.execution.isolation import descendants
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.execution.isolation.stack import ASKED, without
+from gradient_routes.bench.sanitize import pass_on
 from gradient_routes.bench.units import size
 
 TICK = 0.1  # [s] between two checks of its memory
@@ -159,8 +160,7 @@ class Confined:
                 self._stderr = (self._stderr + piece)[-KEPT:]
                 if self._talkative:
                     with suppress(OSError, ValueError):  # stderr is closed here: go on reading, or the process blocks
-                        sys.stderr.write(piece.decode(errors="backslashreplace"))
-                        sys.stderr.flush()
+                        pass_on(piece)
 
     def _memory(self) -> int:
         """Resident bytes of the process and its descendants."""

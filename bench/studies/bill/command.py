@@ -25,6 +25,7 @@ from gradient_routes.bench.command_options import (
 )
 from gradient_routes.bench.execution.options import executor_options, limit_options
 from gradient_routes.bench.ranges import MANY, SECONDS, SEED, SHORT
+from gradient_routes.bench.sanitize import echo
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
@@ -168,7 +169,7 @@ def run(
         done.close(gradients=gradient == SHOWN)
         said, failed = files.write(done.ordered)
         for line in said:
-            click.echo(line, err=as_json)
+            echo(line, err=as_json)
         failed += done.failed
         if failed:
             complain("; ".join(failed))
@@ -177,7 +178,7 @@ def run(
     if failed:
         raise click.exceptions.Exit(1)
     if debugging():
-        click.echo("".join(outcome.row["traceback"] or "" for outcome in done.outcomes), err=True, nl=False)
+        echo("".join(outcome.row["traceback"] or "" for outcome in done.outcomes), err=True, nl=False)
     if done.failures:
         raise click.exceptions.Exit(1)
 

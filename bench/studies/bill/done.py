@@ -8,9 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import click
-
-from gradient_routes.bench.sanitize import unread
+from gradient_routes.bench.sanitize import echo, unread
 from gradient_routes.bench.store.keeping import Keeper
 
 if TYPE_CHECKING:
@@ -61,7 +59,7 @@ class Done:
         row = self._waiting.pop(place)
         if self.as_json:
             with self._printing():
-                click.echo(as_json(row))
+                echo(as_json(row))
 
     def close(self, gradients: bool) -> None:
         """Keep what could not be stored before. Print the table and, if asked for, gradients; with --json the rows that
@@ -80,7 +78,7 @@ class Done:
         with self._printing():
             show([o.row for o in self.ordered], views, kept, self.known)
             if self.count > len(self.outcomes):
-                click.echo(f"{len(self.outcomes)} of {self.count} cases are shown; `routes export` writes all")
+                echo(f"{len(self.outcomes)} of {self.count} cases are shown; `routes export` writes all")
 
     @contextmanager
     def _printing(self) -> Iterator[None]:

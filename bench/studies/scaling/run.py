@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-import click
-
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import ProblemSpec
 from gradient_routes.bench.cases.column import Row
@@ -22,7 +20,7 @@ from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.sweep import How
 from gradient_routes.bench.execution.sweep import run as run_cases
 from gradient_routes.bench.render.terminal.tables import titled
-from gradient_routes.bench.sanitize import plain
+from gradient_routes.bench.sanitize import echo, overwrite
 from gradient_routes.bench.store.keeping import Keeper
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.options import routes_of
@@ -98,7 +96,7 @@ def tell(row: Row | None) -> None:
     """What was measured last, on a line of the terminal that the next one covers; a bar that moves would be timed."""
     if sys.stderr.isatty():
         said = "" if row is None else f"{titled(row)} {row['route']}: {row['status']}"
-        click.echo(f"\r\x1b[K{said[:70]}", nl=False, err=True)
+        overwrite(said[:70])
 
 
 def keeping(keeper: Keeper) -> Callable[[Outcome], None]:
@@ -107,7 +105,7 @@ def keeping(keeper: Keeper) -> Callable[[Outcome], None]:
     def append(outcome: Outcome) -> None:
         keeper.append(outcome.row, outcome.samples, outcome.environment)
         if debugging():
-            click.echo(plain(outcome.row["traceback"] or ""), err=True, nl=False)
+            echo(outcome.row["traceback"] or "", err=True, nl=False)
         tell(outcome.row)
 
     return append
