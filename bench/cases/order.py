@@ -12,9 +12,14 @@ from gradient_routes.bench.cases.column import Row
 Item = TypeVar("Item")
 
 
+def as_asked(items: Iterable[Item], row: Callable[[Item], Row]) -> list[Item]:
+    """By when they began, which is in the order asked for; as they come where that is not known."""
+    return sorted(items, key=lambda item: row(item).get("started") or "")
+
+
 def in_order(items: Iterable[Item], row: Callable[[Item], Row]) -> list[Item]:
-    """Problems as they first appear, the routes on each as `routes list` has them."""
-    items = list(items)
+    """Problems as they were first asked for, the routes on each as `routes list` has them."""
+    items = as_asked(items, row)
     problems = [json.dumps([row(item)[name] for name in ("problem", "problem_options", "partial")]) for item in items]
     first = {problem: i for i, problem in reversed([*enumerate(problems)])}
     pairs = zip(problems, items, strict=True)

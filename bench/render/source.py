@@ -131,13 +131,15 @@ def thinned(rows: Sequence[Row], most: int = MOST) -> list[int]:
 
 
 def latest(cases: Sequence[Row]) -> list[Row]:
-    """The newest row of every case, in the order in which cases were first seen.
+    """The newest row of every case, in the order in which cases were first asked for.
 
     `problem` and `route` become selectors, `family` and `by` keep the bare names.
     """
-    newest: dict[str, Row] = {}
-    for row in cases:
-        newest[row["case_key"] or _unkeyed(row)] = row
+
+    def key(row: Row) -> str:
+        return row["case_key"] or _unkeyed(row)
+
+    newest = {key(row): row for row in cases}
     known: dict[str, str] = {}
 
     def problem(row: Row) -> str:

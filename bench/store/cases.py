@@ -20,10 +20,10 @@ EVERY = tuple(column.name for column in COLUMNS)
 JSON = {column.name for column in COLUMNS if column.json} - {*WORK_PREFIX.values()}
 PREFIX = {name: prefix for prefix, name in WORK_PREFIX.items()}  # of the columns that a row has as one object
 OLD = "rowid"  # a store of an older schema has no keys: every row is a case
-# rows of one case are joined by its key; cases come in the order in which they were first seen
+# rows of one case are joined by its key; cases come in the order in which they were first asked for
 NEWEST = (
-    "JOIN (SELECT max(rowid) AS newest, min(rowid) AS first FROM cases GROUP BY ifnull({0}, rowid))"
-    " ON cases.rowid = newest ORDER BY first"
+    "JOIN (SELECT max(rowid) AS newest, min({asked}) AS asked, min(rowid) AS first FROM cases"
+    " GROUP BY ifnull({key}, rowid)) ON cases.rowid = newest ORDER BY asked, first"
 )
 AT_ONCE = 500  # rows that are asked for by number
 
@@ -65,7 +65,8 @@ def _selected(store: Store, names: Sequence[str], ids: Collection[int] | None, p
     with store.reading() as db:
         there = {column[1] for column in db.execute("PRAGMA table_info(cases)")}
         columns = ", ".join(f'"{name}"' if name in there else f"NULL AS {name}" for name in stored)
-        which = NEWEST.format("case_key" if "case_key" in there else OLD)
+        known = (name if name in there else OLD for name in ("case_key", "started"))
+        which = NEWEST.format(**dict(zip(("key", "asked"), known, strict=True)))
         if ids is not None:
             which = f"WHERE rowid IN ({', '.join('?' * len(ids))})"
         for values in db.execute(f"SELECT {columns} FROM cases {which}", [*(ids or ())]):

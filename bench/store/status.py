@@ -40,7 +40,7 @@ class Standing:
 
 
 def standings(store: Store, columns: Sequence[str] = SHOWN) -> list[Standing]:
-    """Of all cases with these columns, in the order in which they were first seen.
+    """Of all cases with these columns, in the order in which they were first asked for.
 
     Raises InputError where there is no store or none with keys.
     """

@@ -268,7 +268,7 @@ def test_a_cluster_of_this_machine_ends_with_the_sweep(folder: Path, launched) -
 def test_of_workers_on_one_host_one_times(pair: str, cli) -> None:
     ran = cli(*command("bar[n=4|5]", "--json", "--min-time=0", "--isolate", address=pair))
     assert [row["status"] for row in ran.rows] == ["ok", "ok"]
-    assert all(row["seconds"] > 0 < row["forward_ratio"] for row in ran.rows)
+    assert all(row["seconds"] > 0 < row["forward_s"] for row in ran.rows)
     (line,) = ran.err.splitlines()
     assert line.startswith("routes: 1 of 2 Dask workers left idle: they share a host")
     first, second = sorted(ran.rows, key=lambda row: row["started"])

@@ -8,7 +8,13 @@ from pathlib import Path
 import pytest
 from comparisons import row, stored
 
+from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.outcome import Outcome
+from gradient_routes.bench.cases.settings import Settings
+from gradient_routes.bench.execution.sweep import How, run
+from gradient_routes.bench.regression.measured import of_store
+from gradient_routes.bench.render.source import read
+from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.bill.done import Done
 
 ROUTES = ("adjoint", "tangent", "fd-central", "complex-step")
@@ -62,3 +68,30 @@ def test_report_and_compare_group_problems_and_sort_routes(cli, tmp_path: Path) 
     found = json.loads(cli("compare", "s.sqlite", "s.sqlite", "--format", "json").out)["findings"]
     asked = list(dict.fromkeys((f["problem"], f["route"]) for f in found))
     assert [route for _, route in asked] == ["fd-central", "adjoint", "adjoint", "implicit-ad"]
+
+
+def test_cases_are_shown_as_asked_for_whatever_the_order_in_which_they_ended(cli, tmp_path: Path) -> None:
+    """A store holds them as they ended; a case that is run again keeps its place."""
+    asked = ["block", "bar", "advection"]
+    began = {problem: f"2026-01-02T00:00:00.00000{i}+00:00" for i, problem in enumerate(asked)}
+    again = {"problem": "block", "started": "2026-01-03T00:00:00.000000+00:00"}
+    ended = [{"problem": problem, "started": began[problem]} for problem in ("advection", "block", "bar")]
+    rows = [row(**of, case_key=of["problem"], problem_options={}, route_options={}) for of in [*ended, again]]
+    store = stored(tmp_path / "s.sqlite", *rows, verdict=None)
+    assert [of["problem"] for of in read(Store(store)).cases] == asked
+    assert [of.row["problem"] for of in of_store(Store(store)).cases] == asked
+    for verb in (("report", "--store", "s.sqlite"), ("compare", "s.sqlite", "s.sqlite")):
+        lines = [line.split()[0].strip(":") for line in cli(*verb).out.splitlines() if line.strip()]
+        assert list(dict.fromkeys(word for word in lines if word in asked)) == asked
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_cases_begin_in_the_order_asked_for(jobs: int) -> None:
+    """By which they are shown later."""
+    problems, routes = case.problems(["bar[n=4|3|5|2]"]), case.routes(["tangent", "adjoint"])
+    how = How(jobs=jobs) if jobs > 1 else How(isolate=False)
+    ran = sorted(run(problems, routes, Settings(timed=False), how), key=lambda outcome: outcome.place)
+    started = [outcome.row["started"] for outcome in ran]
+    assert started == sorted(set(started)), "no two at once"
+    asked = [(n, route) for n in (4, 3, 5, 2) for route in ("tangent", "adjoint")]
+    assert [(outcome.row["n_param"], outcome.row["route"]) for outcome in ran] == asked
