@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from commands import ROOT
+from commands import PATIENCE, ROOT
 
 FLOORS = ("bench", "problems", "routes")
 GENERATED = {"PKG-INFO", "setup.cfg"}
@@ -71,7 +71,7 @@ class Installed:
         left_out = ("PYTHONPATH", "VIRTUAL_ENV")
         env = {name: value for name, value in os.environ.items() if name not in left_out}
         command = [str(self.bin / program), *arguments]
-        return subprocess.run(command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=300)
+        return subprocess.run(command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=2 * PATIENCE)
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_the_tests_run_from_an_unpacked_sdist(built: Built, tmp_path: Path) -> N
         sdist.extractall(tmp_path, filter="data")
     (root,) = tmp_path.iterdir()
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "tests/test_layers.py"]
-    done = subprocess.run([*command, "-k", "not light"], cwd=root, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([*command, "-k", "not light"], cwd=root, capture_output=True, text=True, timeout=2 * PATIENCE)
     assert done.returncode == 0, done.stdout
     where = "import gradient_routes.bench.cli as cli; print(cli.__file__)"
     done = subprocess.run([sys.executable, "-c", where], cwd=root, capture_output=True, text=True)

@@ -31,7 +31,7 @@ from gradient_routes.bench.execution.cluster.joining import joined, local
 from gradient_routes.bench.execution.cluster.remote import packed
 from gradient_routes.bench.execution.sweep import How, run
 
-PATIENCE = 60.0  # [s] for a machine that is busy with something else
+PATIENCE = 600.0  # [s] however busy the machine: what hangs is ended
 QUICK = ("--no-timing", "--json", "--isolate")
 PROBLEMS = '''
 import os, pathlib, signal, time
@@ -152,6 +152,12 @@ def other_dask(folder: Path) -> None:
 def before_others(folder: Path) -> str:
     """For PYTHONPATH."""
     return os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scheduler that is there answers, however busy the machine."""
+    monkeypatch.setattr("gradient_routes.bench.execution.cluster.joining.TIMEOUT", PATIENCE)
 
 
 @pytest.fixture(scope="module")
@@ -368,7 +374,7 @@ def test_workers_that_do_not_come_are_not_waited_for(lone: Site, folder: Path, m
 
 def test_a_scheduler_that_goes_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("gradient_routes.bench.execution.cluster.joining.TIMEOUT", 3.0)
+    monkeypatch.setattr("gradient_routes.bench.execution.cluster.joining.TIMEOUT", 10.0)
     with ExitStack() as workers, site(folder) as made:
         workers.enter_context(started("distributed.cli.dask_worker", made.address, "--no-dashboard", "--no-nanny"))
         going = outcomes(made.address, PATIENCE)
@@ -393,7 +399,9 @@ def words(options: dict[str, str]) -> list[str]:
     return [f"{name}={value}" for name, value in options.items()]
 
 
-def test_a_cluster_of_this_machine_refuses_who_has_no_credentials_of_it(tmp_path: Path, cli) -> None:
+def test_a_cluster_of_this_machine_refuses_who_has_no_credentials_of_it(
+    tmp_path: Path, cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Any user of the machine can connect to its port."""
     with local(1) as client:
         address = client.scheduler.address
@@ -403,10 +411,11 @@ def test_a_cluster_of_this_machine_refuses_who_has_no_credentials_of_it(tmp_path
                 Client(address, timeout=PATIENCE, set_as_default=False, security=security)
         with pytest.raises((OSError, RuntimeError)):
             Client(address.replace("tls", "tcp"), timeout=3, set_as_default=False)
+        monkeypatch.setattr("gradient_routes.bench.execution.cluster.joining.TIMEOUT", 3.0)
         for options in ([], words(pem(tmp_path / "others"))):
             ran = cli(*command("bar", *QUICK, *options, address=address))
             assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
-            assert ran.err.startswith(f"routes: --scheduler {address}: no Dask scheduler answers within 10 s (")
+            assert ran.err.startswith(f"routes: --scheduler {address}: no Dask scheduler answers within 3 s (")
             assert ran.err.endswith(" - give the --tls-ca-file, --tls-cert and --tls-key of its cluster\n")
         assert client.submit(os.getpid).result(timeout=PATIENCE) != os.getpid(), "it works for whom it is for"
 

@@ -8,6 +8,7 @@ import threading
 from queue import SimpleQueue
 
 import pytest
+from commands import PATIENCE
 
 from gradient_routes.bench.execution.isolation.signals import Interrupt
 
@@ -52,7 +53,7 @@ def test_who_waits_is_woken() -> None:
     with Interrupt(lambda: events.put("wake")):
         timer = threading.Timer(0.1, os.kill, [os.getpid(), signal.SIGINT])
         timer.start()
-        assert events.get(timeout=60) == "wake"
+        assert events.get(timeout=PATIENCE) == "wake"
         timer.join()
 
 

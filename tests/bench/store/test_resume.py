@@ -10,7 +10,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from commands import Ran, shell, with_routes
+from commands import PATIENCE, Ran, shell, with_routes
 
 from benchmarks.faults import sound
 from gradient_routes.bench.cases import environment, keys, sources
@@ -51,7 +51,7 @@ def plugin(tmp_path: Path) -> Path:
 
 def routes(folder: Path, *arguments: str, before: str = "") -> Ran:
     command = ["bash", "-c", f'{before}exec routes run --no-isolate --min-time 0 --json "$@"', "routes", *arguments]
-    done = subprocess.run(command, cwd=folder, env=with_routes(), capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, cwd=folder, env=with_routes(), capture_output=True, text=True, timeout=PATIENCE)
     return Ran(done.returncode, done.stdout, done.stderr)
 
 
@@ -191,7 +191,7 @@ def test_two_runners_of_one_sweep_lose_no_row(plugin: Path) -> None:
     command += ["--problem", "model.py:Model[n=1|2|3|4|5|6|7|8|9|10]"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     runners = [subprocess.Popen(command, cwd=plugin, env=with_routes(), **pipes) for _ in range(3)]
-    printed = [Ran(runner.wait(), *out) for runner, out in [(r, r.communicate(timeout=120)) for r in runners]]
+    printed = [Ran(runner.wait(), *out) for runner, out in [(r, r.communicate(timeout=PATIENCE)) for r in runners]]
     assert [done.code for done in printed] == [0, 0, 0], [done.err for done in printed]
     rows = Store(plugin / "results" / "routes.sqlite").rows()
     every = [(row["case_key"], row["started"]) for done in printed for row in done.rows]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from commands import shell
+from commands import PATIENCE, shell
 
 from gradient_routes.bench.cases.column import Column
 from gradient_routes.bench.cases.row import COLUMNS, SAMPLES, STORED, empty_row
@@ -188,7 +188,7 @@ def test_two_processes_write_at_once(tmp_path: Path) -> None:
     command = [str(Path(sys.executable).with_name("routes")), *RUN, "--no-isolate"]
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     children = [subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) for _ in range(4)]
-    assert [child.communicate(timeout=60)[1] for child in children] == [""] * 4
+    assert [child.communicate(timeout=PATIENCE)[1] for child in children] == [""] * 4
     assert [child.returncode for child in children] == [0] * 4
     assert len(Store(tmp_path / "results" / "routes.sqlite").rows()) == 16
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import PATIENCE
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
@@ -468,7 +469,7 @@ def test_an_interrupt_keeps_what_was_found(tmp_path: Path) -> None:
         if line.startswith("  20 "):
             break
     child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=60)
+    out, err = child.communicate(timeout=PATIENCE)
     assert child.returncode == 130
     assert "Traceback" not in err
     assert "to reach a misfit of" in out
