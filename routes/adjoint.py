@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
 from gradient_routes.problems.problem import Array
+from gradient_routes.routes.corrected import corrected, correction
 from gradient_routes.routes.linearized_solve import Factors, LinearizedSolver, work
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import norm
 from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, route
 
+Correct = Annotated[Literal["no", "yes"], "one Newton step and one adjoint correction more: errors of second order"]
 
-def cost(n_p: int, forward: ForwardWork, *, factors: str) -> Work:
-    return work(forward, 1, transposed=True, factors=factors)
+
+def cost(n_p: int, forward: ForwardWork, *, factors: str, correct: str = "no") -> Work:
+    once = work(forward, 1, transposed=True, factors=factors)
+    return once if correct == "no" else once + correction(forward, factors)
 
 
 @route("adjoint", needs=Offers.LINEARIZE, cost=cost)
-def adjoint(model: Model, p: Array, *, factors: Factors = "refined") -> Result:
+def adjoint(model: Model, p: Array, *, factors: Factors = "refined", correct: Correct = "no") -> Result:
     """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p."""
     state = model.solve(p)
     lin = model.linearize(state)
-    lam = LinearizedSolver(model, state, factors).solve_transposed(-lin.J_u)
-    return Result(state.J, lin.J_p + lin.R_p.T @ lam, state.u, state.residual, lam)
+    R_u = LinearizedSolver(model, state, factors)
+    lam = R_u.solve_transposed(-lin.J_u)
+    if correct == "no":
+        return Result(state.J, lin.J_p + lin.R_p.T @ lam, state.u, state.residual, lam)
+    better = corrected(model, state, R_u, lam)
+    residual = norm(model.residual(better.v, p)) / (state.scale or 1.0)
+    return Result(better.J, better.gradient, better.v, residual, better.lam)

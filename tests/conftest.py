@@ -53,7 +53,7 @@ ROUTES = (fd_one_sided, fd_central, *EXACT, unrolled_ad)
 EVERY_FACTORS = [{"factors": f} for f in ("refined", "fresh")]
 OPTIONS = {
     "tangent": EVERY_FACTORS,
-    "adjoint": EVERY_FACTORS,
+    "adjoint": [*EVERY_FACTORS, *(options | {"correct": "yes"} for options in EVERY_FACTORS)],
     "implicit-ad": EVERY_FACTORS,
     "fd-one-sided": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
