@@ -36,6 +36,7 @@ def declared(column: str, kind: str) -> Column:
 
 
 # columns that several studies have
+ESTIMATE = "what the solves leave in g, estimated: |g - g'|_2 / |g'|_2, g' of adjoint[correct=yes] from its state"
 WHAT = (
     Column("problem", "TEXT", "", "selector of the problem, or whose code was checked"),
     Column("route", "TEXT", "", "selector of the route that gave the gradient; NULL for other people's code"),
@@ -55,6 +56,7 @@ JUDGED = (
     Column("objective_error", "REAL", "1", "|J - J_ref| / |J_ref|, J_ref solved for directly to 1e-13"),
     Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2, where judged in directions V: of V^T g"),
     Column("reference", "TEXT", "", "where g_ref comes from"),
+    Column("gradient_error_estimate", "REAL", "1", ESTIMATE),
     Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved"),
 )
 PLACE = tuple(Column(axis, "REAL", "m", "where it lives") for axis in "xyz")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.bench.cases.column import Column, Row, declared
+from gradient_routes.bench.cases.column import ESTIMATE, Column, Row, declared
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.routes.tally import KINDS
 
@@ -35,6 +35,7 @@ COLUMNS = (
     Column("gradient_norm", "REAL", "problem's", "|dJ/dp|_2, or of the part computed"),
     Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2, where judged in directions V: of V^T g"),
     Column("reference", "TEXT", "", "where g_ref comes from"),
+    Column("gradient_error_estimate", "REAL", "1", ESTIMATE),
     Column("residual", "REAL", "1", "|R(u, p)|_inf / |R(u_0, p)|_inf achieved by the forward solve"),
     Column("adjoint_residual", "REAL", "1", "|R_u^T lam + J_u|_inf / |J_u|_inf achieved by the adjoint solve"),
     Column("linear_solver", "TEXT", "", "factorization behind the forward solve"),

@@ -21,6 +21,7 @@ from gradient_routes.bench.cases.sources import Stamp, changed
 from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite, Status
 from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.cost_model import contained, summary
+from gradient_routes.bench.execution.error_estimate import error_estimate
 from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
@@ -162,6 +163,8 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
     if why is not None:
         record.note(f"{route.name}: {why}")
     _judge(context, route, record, np.asarray(result.gradient))
+    estimate = error_estimate(context.model(), context.price()[1], route, result)
+    record.add({"gradient_error_estimate": estimate})
     begin("the counting of its work")
     again_s = _count(context, route, options, lambda: gradient(p), model, record)
     rounds = Rounds(lambda: gradient(p), context.forward(), min(first_s, again_s), context.settings.min_time)

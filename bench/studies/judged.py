@@ -9,9 +9,11 @@ import numpy as np
 from gradient_routes.bench.cases.case import ProblemSpec
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.case_context import CaseContext
+from gradient_routes.bench.execution.error_estimate import error_estimate
 from gradient_routes.bench.execution.references import Judge
 from gradient_routes.problems.errors import RoutesError
-from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver, State
 from gradient_routes.routes.route import Result, Route
 
 TIGHT = Solver(rtol=1e-13, adjoint_rtol=1e-13)
@@ -24,8 +26,12 @@ class Bench(CaseContext):
         super().__init__(problem, Settings(at=at, budget=budget, solver=TIGHT))
         self.J = self.objective()
 
-    def errors(self, route: Route, result: Result) -> dict[str, Any]:
-        """The columns objective, objective_error, gradient_error and reference. Raises RoutesError for no gradient."""
+    def errors(
+        self, route: Route, result: Result, model: Model | None = None, state: State | None = None
+    ) -> dict[str, Any]:
+        """The columns of J and of the error of the gradient, which is estimated by a model and a state solved with it,
+        those of this bench where none is given. Raises RoutesError for no gradient.
+        """
         g, J = np.asarray(result.gradient), result.J
         if g.shape != self.p.shape or not np.isfinite(g).all():
             raise RoutesError(
@@ -38,6 +44,7 @@ class Bench(CaseContext):
             "objective_error": None if J is None or self.J == 0.0 else abs(J - self.J) / abs(self.J),
             "gradient_error": error,
             "reference": reference,
+            "gradient_error_estimate": error_estimate(model or self.model(), state or self.price()[1], route, result),
         }
 
 

@@ -24,10 +24,11 @@ from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.tally import Work
 
-HEADINGS = ("problem\n  route", "J", "error", "time", "cost /\nforward\nsolve", "work", "memory", "tape")
+HEADINGS = ("problem\n  route", "J", "error,\nestimate", "time", "cost /\nforward\nsolve", "work", "memory", "tape")
 NUMBERS = frozenset((1, 2, 3, 4, 6, 7))
 LEGEND = f"""\
 n_u unknowns, n_p parameters; error: |g - g_ref| / |g_ref|
+estimate: the error that the solves leave, told without a reference by a corrected gradient
 time: one gradient{{}}; cost / forward solve: that time over a forward solve's
 work: {WORK}
 memory: peak of one call; tape: stored by AD for its backward sweep"""
@@ -111,7 +112,9 @@ def _cells(row: Row) -> list[str]:
     per_iteration = row["tape_bytes_per_iteration"]
     return [
         number(row["objective"], 4),
-        number(row["gradient_error"], 2) or "unknown",
+        ", ".join(
+            filter(None, (number(row["gradient_error"], 2) or "unknown", number(row["gradient_error_estimate"], 2)))
+        ),
         ("~" if row["unstable"] else "") + seconds(row["seconds"]) if row["status"] == "ok" else row["status"],
         cost(row),
         _work(row["work"]),

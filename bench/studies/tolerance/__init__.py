@@ -19,14 +19,15 @@ SOLVER = "[direct on nonlinear problems; krylov on linear ones, descent on those
 STUDY = Study(
     name="tolerance",
     question="How wrong is a gradient where the solves are loose? Every route at every tolerance.",
-    help="""Achieved residuals are shown beside the errors. Finite differences differentiate the solver's noise, the
+    help="""Achieved residuals are shown beside the errors, and how near estimates of the
+    errors come to them. Finite differences differentiate the solver's noise, the
     adjoint relies on an identity that a loose solve violates, unrolled AD differentiates another iterate.
 
     Exit code: 0 measured (a tolerance that is not met is a row that says so), 1 the problem cannot be solved at all,
     or --timeout is over, 2 wrong usage, 130 interrupted. What was measured by then is shown and kept.""",
     options=(
         problem_option,
-        routes_option("all"),
+        routes_option("all and adjoint[correct=yes]", ("all", "adjoint[correct=yes]")),
         at_option,
         click.option("--loosest", type=FRACTION, default=1e-1, show_default=True, help="Tolerance to begin with."),
         click.option("--tightest", type=FRACTION, default=1e-14, show_default=True, help="Tolerance to end with."),

@@ -28,9 +28,12 @@ def section(source: Source) -> Section | None:
     rows = source.table("tolerance")
     measured = [row for row in rows if row["rtol"] is not None]
     skipped = [row for row in rows if row["rtol"] is None]
+    estimated = [row for row in measured if row["gradient_error"] and row.get("gradient_error_estimate")]
     if not rows:
         return None
-    figures = ([curves(measured)] if measured else []) + ([left_out(skipped)] if skipped else [])
+    figures = [curves(measured)] if measured else []
+    figures += [estimates(estimated)] if estimated else []
+    figures += [left_out(skipped)] if skipped else []
     says = "Differences differentiate the error of the solver; the adjoint assumes R = 0, which a loose solve violates."
     return Section("tolerance", "Tolerance of the solves", says, tuple(figures))
 
@@ -55,6 +58,24 @@ def curves(rows: Sequence[Row]) -> Figure:
         series=each(rows, "route"),
         panels=tuple(map(panel, rows)),
         routes=True,
+    )
+
+
+def estimates(rows: Sequence[Row]) -> Figure:
+    return Figure(
+        "tolerance-estimates",
+        "Estimated error against the error",
+        "The estimate needs no reference: one Newton step and one adjoint correction from the state of the gradient.",
+        tabulate(
+            "tolerance", rows, "problem route linear_solver rtol adjoint_rtol gradient_error gradient_error_estimate"
+        ),
+        "points",
+        x=(ERROR,),
+        y=(Axis("gradient_error_estimate", "estimate |g − g'| / |g'|", scale="log"),),
+        series=each(rows, "route"),
+        panels=each(rows, "problem"),
+        routes=True,
+        diagonal=True,
     )
 
 

@@ -24,7 +24,7 @@ from gradient_routes.bench.studies.options import one_problem, routes_of
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Offers, Problem
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.newton import Solver, State
 from gradient_routes.routes.route import Options, Result, Route
 from gradient_routes.routes.solvers.iterative import descent, krylov
 from gradient_routes.routes.solvers.registry import linear_solver as named
@@ -78,6 +78,7 @@ class Point:
     objective_error: float | None = None
     gradient_error: float | None = None
     reference: str | None = None
+    gradient_error_estimate: float | None = None
     residual: float | None = None
     adjoint_residual: float | None = None
 
@@ -205,7 +206,7 @@ class Experiment:
         self.bench, self.problem, self.p = bench, bench.problem, bench.p
         self.sweep, self.linear_solver, self.budget = sweep, linear_solver, budget
         self._priced: Prices | None = None
-        self._residuals: dict[float, float | None] = {}
+        self._states: dict[float, State | None] = {}
 
     def points(self, spec: RouteSpec) -> Iterator[Point]:
         route, options = spec.route, self._alike(spec)
@@ -232,25 +233,29 @@ class Experiment:
             model = Model(self.problem, solver)
             options = route.resolve(model, self.p, **options)
             result = route.prepare(model, self.p, **options)(self.p)
-            measured = self.bench.errors(route, result) | self._achieved(result, solver)
+            state = self._solved(solver)
+            measured = self.bench.errors(route, result, model, state) | self._achieved(result, state)
             return Point(route.name, options, rtol, adjoint_rtol, **measured)
         except Exception as failure:
             return Point(route.name, options, rtol, adjoint_rtol, "failed", said(failure))
 
-    def _achieved(self, result: Result, solver: Solver) -> dict[str, float | None]:
-        known = result.residual
+    def _achieved(self, result: Result, state: State | None) -> dict[str, float | None]:
+        """Residuals; of routes that do not tell theirs, that of a forward solve."""
+        known = result.residual if state is None or result.residual is not None else state.residual
         return {
-            "residual": self._residual(solver) if known is None else float(known),
+            "residual": None if known is None else float(known),
             "adjoint_residual": self._adjoint_residual(result),
         }
 
-    def _residual(self, solver: Solver) -> float | None:
-        """Of a forward solve at p, for routes that do not tell theirs."""
-        if solver.rtol not in self._residuals:
+    def _solved(self, solver: Solver) -> State | None:
+        """A forward solve at p; None for a black box, and where the tolerance is not met."""
+        if solver.rtol not in self._states:
             solvable = Offers.SOLVE in self.problem.offers
-            solved = Model(self.problem, solver).solve(self.p).residual if solvable else None
-            self._residuals[solver.rtol] = solved
-        return self._residuals[solver.rtol]
+            try:
+                self._states[solver.rtol] = Model(self.problem, solver).solve(self.p) if solvable else None
+            except RoutesError:
+                self._states[solver.rtol] = None
+        return self._states[solver.rtol]
 
     def _adjoint_residual(self, result: Result) -> float | None:
         if result.lam is None or result.u is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -14,6 +15,7 @@ from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.studies.tolerance.measure import Tolerance
+from gradient_routes.bench.verification.curve import slope
 
 SWEPT = {
     "both": "tolerance of forward and adjoint solves",
@@ -22,6 +24,7 @@ SWEPT = {
 }
 NOT_YET: Row = {"status": "", "residual": None, "adjoint_residual": None, "objective_error": None}  # interrupted
 EXACT = 1e-6  # of the tolerance asked for
+ROUNDING, WITHIN = 1e-12, 3.0  # errors above the first are to be estimated within a factor of the second
 JUMPED = "forward solves are exact at the loosest tolerance"
 SLOWLY = ": --linear-solver descent takes it step by step"
 LEGEND = (
@@ -41,6 +44,8 @@ def show(out: Console, done: Tolerance, plotted: bool = True) -> None:
         out.print(Text(title, style="bold"), soft_wrap=not out.is_terminal)
         tables.show(out, table(measured))
         out.print(Text(LEGEND, style="dim"), soft_wrap=not out.is_terminal)
+    for said in filter(None, (estimates(measured), order(measured))):
+        out.print(Text(said), soft_wrap=not out.is_terminal)
     for line in remarks(rows, done.jumps):
         out.print(line, soft_wrap=not out.is_terminal)
 
@@ -72,6 +77,36 @@ def curves(rows: Sequence[Row], width: int) -> Text:
         for (name, of), mark in zip(routes.items(), letters, strict=True)
     ]
     return plot(series, _axis(rows[0]), f"{tables.named('problem', rows[0])}: |g - g_ref| / |g_ref|", width)
+
+
+def estimates(rows: Sequence[Row]) -> str:
+    """How near the estimates of errors come to the errors that are more than rounding."""
+    known = [(r["gradient_error"], r["gradient_error_estimate"]) for r in rows]
+    ratios = [estimate / error for error, estimate in known if error and estimate is not None and error > ROUNDING]
+    if not ratios:
+        return ""
+    within = sum(1.0 / WITHIN <= ratio <= WITHIN for ratio in ratios)
+    least, most = (number(end(ratios), 2) for end in (min, max))
+    return (
+        f"estimated error / error: {least} to {most}; within a factor of {WITHIN:g} for {within} of {len(ratios)}"
+        f" errors above {ROUNDING:g}"
+    )
+
+
+def order(rows: Sequence[Row]) -> str:
+    """The power with which the error of the corrected adjoint falls where that of the adjoint does."""
+    plain, better = ({swept(r): r["gradient_error"] for r in rows if _adjoint(r, correct)} for correct in ("no", "yes"))
+    pairs = {(plain[t], better[t]) for t in plain.keys() & better.keys() if plain[t] and better[t]}
+    pairs = {(error, less) for error, less in pairs if less > ROUNDING}
+    x, y = (np.array(each) for each in (zip(*sorted(pairs), strict=True) if pairs else ((), ())))
+    power = slope(x, y, np.ones(len(x), dtype=bool))
+    if power is None:
+        return ""
+    return f"the error of adjoint[correct=yes] falls like that of adjoint to the power {power:.2g}"
+
+
+def _adjoint(row: Row, correct: str) -> bool:
+    return bool(row["route"] == "adjoint" and row["route_options"].get("correct") == correct)
 
 
 def _axis(row: Row) -> str:

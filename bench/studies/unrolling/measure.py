@@ -45,6 +45,7 @@ class Iterate:
     objective_error: float | None = None
     gradient_error: float | None = None
     reference: str | None = None
+    gradient_error_estimate: float | None = None
     residual: float | None = None
     tape_bytes: int | None = None
     products: int | None = None
