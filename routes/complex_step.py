@@ -34,11 +34,11 @@ def complex_step(model: Model, p: Array) -> Gradient:
         for i, h in enumerate(RELATIVE_STEP * np.where(p == 0.0, scale, np.minimum(np.abs(p), scale))):
             q = p.astype(np.complex128)
             q[i] += 1j * h
-            J = model.solve(q, polish=POLISH).J
-            g[i] = J.imag / h
+            state = model.solve(q, polish=POLISH)
+            g[i] = state.J.imag / h
         if not tested:
             refuse_zeros(model.problem, Model(model.problem, model.solver).value, p, g)
             tested.append(True)
-        return Result(float(J.real), g)
+        return Result(float(state.J.real), g, state.u.real)
 
     return gradient

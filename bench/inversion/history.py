@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.inversion.error_bar import ErrorBar
 from gradient_routes.bench.inversion.objective import Evaluation, Objective
 from gradient_routes.bench.inversion.slopes import EPS, ROUNDED
 from gradient_routes.problems.problem import Array
@@ -51,6 +52,9 @@ class History:
     first: Evaluation | None = None
     last: Evaluation | None = None
     ratios: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.error_bar = ErrorBar(self.objective)
 
     def take(self, found: Evaluation, says: str | None = None) -> None:
         """Record an accepted step, and whether steps before it left the domain of J."""

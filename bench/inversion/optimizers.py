@@ -45,6 +45,8 @@ def accept(objective: Objective, history: History, limits: Limits, x: Array) -> 
         raise Stopped(f"diverging: J = {found.J:.3g} is {found.J / objective.J_0:.3g} times that of the start")
     if norm2(found.by_x) <= limits.tolerance * objective.slope_0:
         raise Stopped(f"converged: |dJ/dp| is {limits.tolerance:g} of that at the start")
+    if history.error_bar.hides(found):
+        raise Stopped(history.error_bar.says)
 
 
 def minimized(objective: Objective, history: History, limits: Limits, options: Any, **method: Any) -> str:

@@ -186,6 +186,8 @@ def _on_solver(check: Check, says: str, proven: str | None) -> Check:
     last = check.tightened[-1]
     says += f", falls to {last.reading.off:.1e} when the forward solve is tightened by {last.factor:g}"
     says += f": {_what_moved(check)}"
+    if check.by_solve is not None:
+        says += f"; the state alone is estimated to leave an error of {check.by_solve:.1e}"
     return replace(check, says=says, todo=_tighten_by(check, proven), culprit=proven)
 
 

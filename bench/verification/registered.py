@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 
 import numpy as np
 
+from gradient_routes.bench.execution.error_estimate import error_estimate
 from gradient_routes.bench.execution.slopes import complex_slopes
-from gradient_routes.bench.verification.factors import Factors, assembly
+from gradient_routes.bench.verification.factors import SOLVED, Factors, assembly
 from gradient_routes.bench.verification.finding import Finding
+from gradient_routes.bench.verification.result import BY_SOLVE
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Problem
+from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.newton import Solver, State
 from gradient_routes.routes.route import Options, Result, Route
 from gradient_routes.routes.synthetic_data import with_synthetic_data
 
@@ -114,11 +118,21 @@ def exact(problem: Problem, p: Array) -> Array:
     return np.asarray(lin.J_p + lin.R_p.T @ lam)
 
 
+def by_solve(model: Model, state: State, u: Array) -> Finding:
+    """What the state u leaves in the gradient of an exact adjoint: no mistake of the route, whose own is not used."""
+    at = replace(state, u=u)
+    lin = model.linearize(at)
+    lam = LinearizedSolver(model, at, "refined").solve_transposed(-lin.J_u)
+    left = error_estimate(model, state, adjoint, Result(None, lin.J_p + lin.R_p.T @ lam, u, lam=lam))
+    return Finding(BY_SOLVE, math.nan if left is None else left, SOLVED)
+
+
 def explain(model: Model, result: Result, p: Array, gradient: Array) -> list[Finding]:
     """The factors of the gradient, tested at the state that the route returned, or at a solved one."""
     problem = model.problem
     try:
-        u = model.solve(p).u if result.u is None else np.asarray(result.u)
-        return [*assembly(model, result, p, gradient), *Factors(problem, u, p).findings()]
+        state = model.solve(p)
+        u = state.u if result.u is None else np.asarray(result.u)
+        return [*assembly(model, result, p, gradient), by_solve(model, state, u), *Factors(problem, u, p).findings()]
     except RoutesError as failure:
         return [Finding("factors of the gradient", float("nan"), 0.0, str(failure))]

@@ -28,6 +28,7 @@ Verdict = Literal[
 EXIT = {"agrees": 0, "wrong-gradient": 1, "inconsistent-discretization": 1, "unrepeatable": 1}
 INCONCLUSIVE = 3
 FRESH_J = "J against fresh J"
+BY_SOLVE = "error that the forward solve leaves, estimated"
 SHRINKS = 0.6  # order in the mesh size from which on a plateau is one of the discretization
 STAYS, SEVERAL = 0.3, 3  # order up to which it is not, on so many meshes
 MEANING: dict[Verdict, str] = {
@@ -152,6 +153,11 @@ class Check:
     def recorded(self) -> Finding | None:
         """The finding that J is not what its author computes anew, whatever the gradient agrees with."""
         return next((f for f in self.findings if f.name == FRESH_J and f.sound is False), None)
+
+    @property
+    def by_solve(self) -> float | None:
+        """The error of an exact adjoint at the state of the route, estimated, where it is more than agreement."""
+        return next((f.value for f in self.findings if f.name == BY_SOLVE and f.sound is False), None)
 
     @property
     def moves(self) -> bool:

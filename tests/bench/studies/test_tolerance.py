@@ -21,7 +21,7 @@ from gradient_routes.bench.studies.tolerance.measure import (
     default_solver,
     tolerance,
 )
-from gradient_routes.bench.studies.tolerance.view import remarks
+from gradient_routes.bench.studies.tolerance.view import estimates, order, remarks
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.routes.solvers.iterative import DESCENT, solver
@@ -221,3 +221,15 @@ def test_wrong_usage_is_one_line(cli, arguments: str) -> None:
     ran = cli("tolerance", "--problem", "bar", "--no-store", *arguments.split())
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert WRONG[arguments] in ran.err
+
+
+def test_estimates_come_near_the_errors_and_the_corrected_adjoint_is_of_second_order() -> None:
+    done = study("bar[n=24]", "adjoint", "adjoint[correct=yes]")
+    ratio = column(done, "gradient_error_estimate") / column(done, "gradient_error")
+    loose = column(done, "gradient_error") > 1e-12
+    assert loose.sum() >= 15
+    assert ((ratio > 1 / 3) & (ratio < 3))[loose].all()
+    assert estimates(done.rows).startswith("estimated error / error: ")
+    assert estimates(done.rows).endswith(f"for {loose.sum()} of {loose.sum()} errors above 1e-12")
+    assert order(done.rows) == "the error of adjoint[correct=yes] falls like that of adjoint to the power 2"
+    assert order([row for row in done.rows if row["route_options"]["correct"] == "no"]) == ""
