@@ -60,6 +60,14 @@ def correction(forward: ForwardWork, factors: str) -> Work:
     return extra + Work(solves=sweeps, transposed_solves=-sweeps)
 
 
+def adjoint_at(model: Model, state: State, u: Array) -> tuple[Array, Array]:
+    """dJ/dp (n_p,) and lam (n_u,) of an exact adjoint at the state u (n_u,), by the factors of the solved `state`."""
+    at = replace(state, u=u)
+    lin = model.linearize(at)
+    lam = LinearizedSolver(model, at, "refined").solve_transposed(-lin.J_u)
+    return lin.J_p + lin.R_p.T @ lam, lam
+
+
 def error_bar(model: Model, state: State, u: Array, lam: Array | None) -> Corrected:
     """g' to hold a gradient of any route against, at the state u (n_u,) that it belongs to, with its lam if it has one.
 
@@ -70,5 +78,5 @@ def error_bar(model: Model, state: State, u: Array, lam: Array | None) -> Correc
     solver = replace(model.solver, adjoint_rtol=max(RTOL, model.solver.adjoint_rtol))
     R_u = LinearizedSolver(Model(model.problem, solver), at, "refined")
     if lam is None:
-        lam = LinearizedSolver(model, at, "refined").solve_transposed(-model.linearize(at).J_u)
+        _, lam = adjoint_at(model, state, u)
     return corrected(model, at, R_u, lam)

@@ -7,7 +7,7 @@ import numpy as np
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
 from gradient_routes.problems.problem import Offers
-from gradient_routes.routes.corrected import error_bar
+from gradient_routes.routes.corrected import adjoint_at, error_bar
 from gradient_routes.routes.model import Model
 
 NEAR = 100.0  # times its last known error, beyond which a gradient is not tested: errors change little between steps
@@ -45,7 +45,8 @@ class ErrorBar:
         try:
             state = model.solve(found.p)
             u = state.u if found.u is None else np.asarray(found.u)
-            better = error_bar(model, state, u, found.lam)
+            gradient, lam = adjoint_at(model, state, u)  # a mistake of the route is no error of its solves
+            better = error_bar(model, state, u, lam)
         except OUTSIDE:
             return 0.0
-        return norm2((found.gradient - better.gradient) * objective.variables.slope(found.x))
+        return norm2((gradient - better.gradient) * objective.variables.slope(found.x))

@@ -17,6 +17,7 @@ from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.corrected import adjoint_at
 from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, State
@@ -120,10 +121,8 @@ def exact(problem: Problem, p: Array) -> Array:
 
 def by_solve(model: Model, state: State, u: Array) -> Finding:
     """What the state u leaves in the gradient of an exact adjoint: no mistake of the route, whose own is not used."""
-    at = replace(state, u=u)
-    lin = model.linearize(at)
-    lam = LinearizedSolver(model, at, "refined").solve_transposed(-lin.J_u)
-    left = error_estimate(model, state, adjoint, Result(None, lin.J_p + lin.R_p.T @ lam, u, lam=lam))
+    gradient, lam = adjoint_at(model, state, u)
+    left = error_estimate(model, state, adjoint, Result(None, gradient, u, lam=lam))
     return Finding(BY_SOLVE, math.nan if left is None else left, SOLVED)
 
 
