@@ -17,7 +17,7 @@ from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact,
 from gradient_routes.routes.precision import double, double_operator
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
-from gradient_routes.routes.tally import Tally
+from gradient_routes.routes.tally import Tally, Work
 
 
 class Model:
@@ -95,6 +95,11 @@ class Model:
         """
         factors = state.factors if state.rate is None else self.factors_at(state)
         return factors.negative_eigenvalues
+
+    def state_at(self, u: Array, p: Array) -> State:
+        """A state (n_u,) that was solved for before, with new factors of R_u; its history is its own residual."""
+        factors, R = self.factorize(self.tangent(u, p)), norm(self.residual(u, p))
+        return State(p, u, self.problem.objective(u, p), (R,), 0.0, factors, Work())
 
     def noise(self, state: State) -> float:
         """|dJ| by one more full Newton step from a solved state: about the error that the tolerance leaves in J."""

@@ -21,26 +21,30 @@ COMMANDS = {
 LONGEST = 2.5  # [s] of waiting before the signal
 TRIES = 6
 MARK = "GRADIENT_ROUTES_TESTED"
+IGNORING = ("sh", "-c", 'trap "" INT; exec "$@"', "sh")
 
 
 def started(folder: Path, command: str, mark: str, disposition: str = "blocked") -> subprocess.Popen[str]:
     """A command that is told nothing before it can listen: SIGINT is inherited blocked, or ignored."""
+    words = [sys.executable, "-m", "gradient_routes.bench.start", *COMMANDS[command]]
+    if disposition == "ignored":
+        return process([*IGNORING, *words], folder, mark)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        return process(words, folder, mark)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def prepare() -> None:
-        if disposition == "ignored":
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-        else:
-            signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
 
+def process(words: list[str], folder: Path, mark: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "gradient_routes.bench.start", *COMMANDS[command]],
+        words,
         cwd=folder,
         env={**os.environ, MARK: mark},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=prepare,
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from gradient_routes.bench.command_options import debug_option, store_option
+from gradient_routes.bench.sanitize import echo
 
 
 @click.command()
@@ -24,4 +25,4 @@ def merge(others: tuple[Path, ...], store: Path) -> None:
 
     for other in others:
         cases, studies = add(Store(store), Store(other))
-        click.echo(f"{cases} cases and {studies} studies of {other} added to {store}")
+        echo(f"{cases} cases and {studies} studies of {other} added to {store}")

@@ -14,7 +14,7 @@ NEAR = 100.0  # times its last known error, beyond which a gradient is not teste
 
 
 class ErrorBar:
-    """The estimated error of dJ/dx, `known` at the last step where it was asked for: by uncounted solves."""
+    """The estimated error of dJ/dx, `known` at the last step where it was asked for: no forward solve is made."""
 
     def __init__(self, objective: Objective) -> None:
         problem, route = objective.problem, objective.route
@@ -23,9 +23,9 @@ class ErrorBar:
         self.asked = False
 
     def hides(self, found: Evaluation) -> bool:
-        """Whether |dJ/dx| is less than its own error; never where that cannot be estimated."""
+        """Whether |dJ/dx| is less than its own error; never where that cannot be estimated: without a state."""
         size = norm2(found.by_x)
-        if not self.able or size == 0.0 or (self.asked and size > NEAR * self.known):
+        if not self.able or found.u is None or size == 0.0 or (self.asked and size > NEAR * self.known):
             return False
         self.asked, self.known = True, self._error(found)
         return size < self.known
@@ -43,8 +43,8 @@ class ErrorBar:
         objective = self.objective
         model = Model(objective.problem, objective.model.solver)
         try:
-            state = model.solve(found.p)
-            u = state.u if found.u is None else np.asarray(found.u)
+            u = np.asarray(found.u)
+            state = model.state_at(u, found.p)
             gradient, lam = adjoint_at(model, state, u)  # a mistake of the route is no error of its solves
             better = error_bar(model, state, u, lam)
         except OUTSIDE:

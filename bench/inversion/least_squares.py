@@ -71,7 +71,8 @@ class Residuals:
         """J and its gradient by the chain rule, dJ/dx = (dr/dx)^T r."""
         r = self._last = self(x)
         by_x = np.asarray(derivative.T @ r)
-        return Evaluation(x.copy(), self._p(x), 0.5 * float(r @ r), by_x, by_x / self.objective.variables.slope(x))
+        p, u = self._p(x), self.state(x).u
+        return Evaluation(x.copy(), p, 0.5 * float(r @ r), by_x, by_x / self.objective.variables.slope(x), u=u)
 
     def _p(self, x: Array) -> Array:
         return self.problem.parameters.check(self.objective.variables.p(x), self.problem.name)

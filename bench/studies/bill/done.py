@@ -42,16 +42,16 @@ class Done:
         from gradient_routes.bench.cases.row import ANSWERED
 
         self._keeper.append(outcome.row, outcome.samples, outcome.environment)
-        self._waiting[outcome.place] = outcome.row
-        while self._next in self._waiting:
-            self._print(self._next)
-            self._next += 1
         self.count += 1
         failed = outcome.row["status"] not in ANSWERED
         self.failures += failed and not as_expected(outcome.row, self.known)
         if len(self.outcomes) < (2 * MOST if failed else MOST) or self._views:
             slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
             self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
+        self._waiting[outcome.place] = outcome.row
+        while self._next in self._waiting:
+            self._print(self._next)
+            self._next += 1
 
     def _print(self, place: int) -> None:
         from gradient_routes.bench.cases.row import as_json

@@ -24,11 +24,11 @@ from gradient_routes.bench.render.terminal.text_table import TextTable
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.tally import Work
 
-HEADINGS = ("problem\n  route", "J", "error,\nestimate", "time", "cost /\nforward\nsolve", "work", "memory", "tape")
+HEADINGS = ("problem\n  route", "J", "error\n(esti-\nmate)", "time", "cost /\nforward\nsolve", "work", "memory", "tape")
 NUMBERS = frozenset((1, 2, 3, 4, 6, 7))
 LEGEND = f"""\
 n_u unknowns, n_p parameters; error: |g - g_ref| / |g_ref|
-estimate: the error that the solves leave, told without a reference by a corrected gradient
+(estimate): the error that the solves leave, told without a reference by a corrected gradient
 time: one gradient{{}}; cost / forward solve: that time over a forward solve's
 work: {WORK}
 memory: peak of one call; tape: stored by AD for its backward sweep"""
@@ -112,15 +112,18 @@ def _cells(row: Row) -> list[str]:
     per_iteration = row["tape_bytes_per_iteration"]
     return [
         number(row["objective"], 4),
-        ", ".join(
-            filter(None, (number(row["gradient_error"], 2) or "unknown", number(row["gradient_error_estimate"], 2)))
-        ),
+        _error(row),
         ("~" if row["unstable"] else "") + seconds(row["seconds"]) if row["status"] == "ok" else row["status"],
         cost(row),
         _work(row["work"]),
         bytes_(row["peak_bytes"], RESOLUTION),
         bytes_(row["tape_bytes"]) + ("" if per_iteration is None else f" ({bytes_(per_iteration)}/it)"),
     ]
+
+
+def _error(row: Row) -> str:
+    estimate = number(row["gradient_error_estimate"], 1)
+    return (number(row["gradient_error"], 2) or "unknown") + (f" ({estimate})" if estimate else "")
 
 
 def _work(work: dict[str, int] | None) -> str:

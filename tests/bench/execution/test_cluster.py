@@ -452,7 +452,7 @@ REFUSED = {
     "--workers=2": "--workers: is of --executor dask - leave it out",
     "--executor=dask --jobs=2": "--jobs: is of --executor local, a Dask cluster has workers - leave it out",
     "--executor=dask --no-isolate": "--executor dask: cases on its workers run in processes of their own",
-    "--executor=dask --workers=0": "--workers 0 - give 1 or more",
+    "--executor=dask --workers=0": "--workers 0 - give a whole number from 1 to 4096",
     "--executor=dask --workers=2": "--workers 2: cases side by side spoil each other's timing - add --no-timing",
     "--executor=dask --workers=2 --scheduler=tcp://h:1": "--workers: of a cluster of this machine",
     "--executor=dask --scheduler=nonsense://x": "--scheduler nonsense://x: no Dask scheduler answers within 10 s",

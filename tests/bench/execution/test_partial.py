@@ -359,10 +359,19 @@ def test_a_part_too_dear_tells_the_bill_of_the_whole_too(cli) -> None:
     assert "(16 fwd)" in row["note"]
 
 
-@pytest.mark.parametrize("count", ["8", "9", "1000"])
-def test_all_components_are_the_whole(cli, count: str) -> None:
-    command = "run --json --no-store --min-time 0 --problem bar --route adjoint --components"
-    (row,) = cli(*command.split(), count).rows
+WHOLE = "run --json --no-store --min-time 0 --problem bar --route adjoint --components"
+
+
+@pytest.mark.parametrize("count", ["9", "1000"])
+def test_more_components_than_there_are_are_refused(cli, count: str) -> None:
+    ran = cli(*WHOLE.split(), count)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert f"--components {count}" in ran.err
+    assert "8" in ran.err
+
+
+def test_all_components_are_the_whole(cli) -> None:
+    (row,) = cli(*WHOLE.split(), "8").rows
     assert (row["partial"], len(row["gradient"])) == (None, 8)
     assert "whole gradient" not in row["note"]
 

@@ -83,6 +83,8 @@ def reading(folder: Path) -> list[list[str]]:
             resumed += [[*words, "--resume"]] if "resume" in options else []
             continue
         assert "store" in options or files or name == "list", f"{name}: say here how it is called on a store"
+        if name == "merge":  # into another one
+            words += ["--store", "merged.sqlite"]
         found.append(words)
         if len(files) > 1:
             found.append([name, *reversed(named)])

@@ -39,14 +39,14 @@ def test_a_json_row_is_printed_once_all_before_it_are(capsys: pytest.CaptureFixt
     assert printed(capsys) == []
     take(results, 0, 3)
     assert printed(capsys) == ["adjoint", "tangent"]
-    results.show(gradients=False)  # interrupted: place 2 never comes
+    results.close(gradients=False)  # interrupted: place 2 never comes
     assert printed(capsys) == ["complex-step"]
 
 
 def test_the_table_is_in_the_order_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
     results = done(as_json=False)
     take(results, 2, 0, 3, 1)
-    results.show(gradients=False)
+    results.close(gradients=False)
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0].split("[")[0] for line in lines if line.startswith("  ") and "1 fwd" in line] == list(
         ROUTES

@@ -385,9 +385,9 @@ def test_nothing_measured_is_exit_code_1(cli) -> None:
 
 WRONG = {
     "--problem all": "name one problem",
-    "--problem bar --growth 1": "give a growth > 1",
-    "--problem bar --levels 0": "at least one level",
-    "--problem bar --from 0": "n=0 is no size",
+    "--problem bar --growth 1": "--growth 1 - give a number > 1",
+    "--problem bar --levels 0": "--levels 0 - give a whole number from 1",
+    "--problem bar --from 0": "--from 0 - give a whole number from 1",
     "--problem bar --min-time -1": "--min-time",
     "--problem bar --budget nan": "--budget",
     "--problem bar[n=8|16] --levels 3": "the sizes are those of the grid",
