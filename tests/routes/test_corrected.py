@@ -22,7 +22,7 @@ LOOSE = {
     "block": (Block(n=2), "auto"),
     "softplus": (Bar(n=4, sensors=3, stop="softplus", width=0.3, k_c=5.0), "auto"),
     "advection": (Advection(n=3), "krylov"),
-    "bar": (Bar(n=24), "descent"),
+    "bar": (Bar(), "descent"),
 }
 TOLERANCES = (1e-1, 1e-3, 1e-5, 1e-8)
 ROUNDING = 1e-12  # errors below are not those of the solves alone

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from rich.cells import cell_len
 from rich.text import Text
 
-# where a cell may be folded: after a comma, before + ( and ->, after a hyphen within a word
-FOLDS = re.compile(r"(?<=, )|(?<= )(?=[+(]|->)|(?<=[a-z]-)(?=[a-z])")
+# where a cell may be folded: after a comma, before + ( and ->, after a hyphen or a prefix within a word
+FOLDS = re.compile(r"(?<=, )|(?<= )(?=[+(]|->)|(?<=[a-z]-)(?=[a-z])|(?<=^un)(?=resolved$)")
 WORDS = re.compile(r"(?<= )|(?<=[a-z]-)(?=[a-z])")  # where a heading may be folded
 NOWHERE = re.compile(r"(?!)")
 INDENT, GAP = "  ", " "

@@ -19,7 +19,7 @@ from gradient_routes.problems.errors import InputError, RoutesError
 PROBLEM = """
 import numpy as np
 from gradient_routes import Offers, Parameters, Problem
-from beside import POWER
+from adjacent import POWER
 
 class Power(Problem):
     name = "power"
@@ -63,7 +63,7 @@ ENDS = dict(
 def folder(tmp_path: Path) -> Path:
     """A problem in a file, what it imports, a store, a baseline of it and a file of its own."""
     (tmp_path / "prob.py").write_text(PROBLEM)
-    (tmp_path / "beside.py").write_text("POWER = 2\n")
+    (tmp_path / "adjacent.py").write_text("POWER = 2\n")
     (tmp_path / "p.csv").write_text("log E\n1.0\n")
     (tmp_path / "notes.doc").write_text("of mine")
     done = shell(f"routes {RUN} && routes baseline --store s.sqlite -o base.json", tmp_path)
@@ -83,10 +83,10 @@ def test_no_option_writes_over_what_is_no_earlier_result(folder: Path, cli, opti
     """Neither by its name, nor by a link, whatever its name ends with."""
     os.link(folder / "s.sqlite", folder / f"hard{ENDS[option]}")
     (folder / f"soft{ENDS[option]}").symlink_to("s.sqlite")
-    (folder / f"source{ENDS[option]}").symlink_to("beside.py")
+    (folder / f"source{ENDS[option]}").symlink_to("adjacent.py")
     (folder / f"journal{ENDS[option]}").symlink_to("s.sqlite-journal")
     before = contents(folder)
-    for name in ("prob.py", "beside.py", "notes.doc", "s.sqlite", "s.sqlite-wal", "s.sqlite-claims",
+    for name in ("prob.py", "adjacent.py", "notes.doc", "s.sqlite", "s.sqlite-wal", "s.sqlite-claims",
                  *(f"{kind}{ENDS[option]}" for kind in ("hard", "soft", "source", "journal"))):  # fmt: skip
         ran = cli(*OPTIONS[option].split(), name)
         assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1), name
@@ -96,7 +96,7 @@ def test_no_option_writes_over_what_is_no_earlier_result(folder: Path, cli, opti
 
 @pytest.mark.parametrize(("option", "link"), [("--gradient", "g.csv"), ("check --html", "g.html")])
 def test_a_source_is_known_by_its_hard_links(folder: Path, cli, option: str, link: str) -> None:
-    for source in ("prob.py", "beside.py"):
+    for source in ("prob.py", "adjacent.py"):
         os.link(folder / source, folder / link)
         ran = cli(*OPTIONS[option].split(), link)
         assert (ran.code, "is another file of this run" in ran.err) == (2, True)

@@ -224,10 +224,10 @@ def test_wrong_usage_is_one_line(cli, arguments: str) -> None:
 
 
 def test_estimates_come_near_the_errors_and_the_corrected_adjoint_is_of_second_order() -> None:
-    done = study("bar[n=24]", "adjoint", "adjoint[correct=yes]")
+    done = study("bar", "adjoint", "adjoint[correct=yes]", sweep=ToleranceSweep(decades(1e-1, 1e-8)))
     ratio = column(done, "gradient_error_estimate") / column(done, "gradient_error")
     loose = column(done, "gradient_error") > 1e-12
-    assert loose.sum() >= 15
+    assert loose.sum() >= 10
     assert ((ratio > 1 / 3) & (ratio < 3))[loose].all()
     assert estimates(done.rows).startswith("estimated error / error: ")
     assert estimates(done.rows).endswith(f"for {loose.sum()} of {loose.sum()} errors above 1e-12")
