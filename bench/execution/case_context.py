@@ -71,6 +71,7 @@ class CaseContext:
         direct = replace(settings.solver, linear_solver=Solver.linear_solver, newton=Solver.newton)
         self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_reference, found)
         self._forward_model = self.model()
+        self.factor_bytes: int | None = None  # behind the forward solve, once priced
         self._priced: tuple[Prices, State | None] | Exception | None = None
 
     def _restrict(self, partial: Partial | None) -> str | None:
@@ -98,6 +99,8 @@ class CaseContext:
         if self._priced is None:
             try:
                 self._priced = prices(self._forward_model, self.p)
+                state = self._priced[1]  # a transposed solve may add factors of R_u^T later
+                self.factor_bytes = None if state is None else int(state.factors.nbytes)
             except Exception as failure:  # raised again, for every route
                 self._priced = failure
         if isinstance(self._priced, Exception):

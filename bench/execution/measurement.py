@@ -313,7 +313,7 @@ def _count(
         record.add({"tape_bytes_per_iteration": tape / (options["iterations"] * (options.get("newton") or 1))})
     state = context.price()[1]
     if state is not None:
-        record.add({"linear_solver": state.factors.name, "factor_bytes": int(state.factors.nbytes)})
+        record.add({"linear_solver": state.factors.name, "factor_bytes": context.factor_bytes})
         with suppress(RoutesError):  # a state at which R_u is singular has no such numbers
             _note_state(context, route, options, model, state, record)
     return again_s
