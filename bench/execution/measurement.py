@@ -163,8 +163,7 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
     if why is not None:
         record.note(f"{route.name}: {why}")
     _judge(context, route, record, np.asarray(result.gradient))
-    estimate = error_estimate(context.model(), context.price()[1], route, result)
-    record.add({"gradient_error_estimate": estimate})
+    _estimate(context, route, record, result)
     begin("the counting of its work")
     again_s = _count(context, route, options, lambda: gradient(p), model, record)
     rounds = Rounds(lambda: gradient(p), context.forward(), min(first_s, again_s), context.settings.min_time)
@@ -290,10 +289,22 @@ def _judge(context: CaseContext, route: Route, record: Record, g: Array) -> None
         record.note(f"{route.name}: {judge.instead}")
     error, reference = judge.error(g)
     record.add({"gradient_error": error, "reference": reference})
-    residual = record.known["residual"]
-    converged = residual is not None and residual <= min(10.0 * context.settings.solver.rtol, SMALL)
-    if converged and error > WRONG:
+    if _converged(context, record) and error > WRONG:
         record.note(f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
+
+
+def _estimate(context: CaseContext, route: Route, record: Record, result: Result) -> None:
+    """The estimated error, and a warning where it is large though the error, relative to the terms of J, is not."""
+    estimate = error_estimate(context.model(), context.price()[1], route, result)
+    record.add({"gradient_error_estimate": estimate})
+    known = record.known.get("gradient_error")
+    if _converged(context, record) and estimate is not None and estimate > WRONG and not (known or 0.0) > WRONG:
+        record.note(f"{route.name}: the estimated error is {estimate:.2g} of the gradient: wrong, or rounding beside J")
+
+
+def _converged(context: CaseContext, record: Record) -> bool:
+    residual = record.known["residual"]
+    return residual is not None and residual <= min(10.0 * context.settings.solver.rtol, SMALL)
 
 
 def _count(

@@ -129,3 +129,13 @@ def test_a_failed_solve_says_how_far_it_came_relative_to_its_start() -> None:
     bar = Bar(n=8, stop="softplus")
     with pytest.raises(NotConverged, match=r"in 1 steps: \|R\| / \|R_0\| = .*, wanted 1e-12, max-steps=1; \|R\| = "):
         Model(bar, Solver(max_steps=1)).solve(bar.parameters.start)
+
+
+@pytest.mark.parametrize(("name", "warned"), [("faulty-adjoint[fault=sign]", True), ("adjoint", False)])
+def test_a_wrong_gradient_far_below_J_is_warned_of(cli, name: str, warned: bool) -> None:
+    """Its error, relative to the terms of J, is 1e-14; the estimated one is 2."""
+    problem = "block[n=2,traction=1e-14]"
+    (row,) = cli("run", "--json", "--no-store", "--no-timing", "--problem", problem, "--route", name).rows
+    assert row["gradient_error"] < 1e-12
+    assert (row["gradient_error_estimate"] > 1) is warned
+    assert ("the estimated error is 2 of the gradient" in (row["note"] or "")) is warned
