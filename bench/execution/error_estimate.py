@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gradient_routes.bench.execution.references import error
+from gradient_routes.bench.execution.references import CANCELLED, error, norm2
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Offers, Reference
-from gradient_routes.routes.corrected import error_bar
+from gradient_routes.routes.corrected import Corrected, adjoint_at, error_bar
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 from gradient_routes.routes.route import Result, Route
@@ -20,12 +20,32 @@ def error_estimate(model: Model, state: State | None, route: Route, result: Resu
     for problems without partial derivatives, and where the correction cannot be solved for. g' takes R_p, J_u and J_p
     from the problem: what is wrong there does not show.
     """
-    if route.accuracy > 0.0 or Offers.LINEARIZE not in model.problem.offers or state is None:
-        return None
-    u = state.u if result.u is None else np.asarray(result.u)
-    try:
-        better = error_bar(model, state, u, result.lam)
-    except RoutesError:
+    better = _corrected(model, state, route, result)
+    if better is None:
         return None
     relative, _ = error(np.asarray(result.gradient), Reference("corrected", better.gradient, better.terms))
     return float(relative) if np.isfinite(relative) else None
+
+
+def beyond_rounding(model: Model, state: State | None, route: Route, result: Result) -> bool:
+    """Whether g is further from g' than an adjoint gradient moves where the rounding of u does: g is wrong then.
+
+    Near a minimum g is made of the rounding of u alone, and as far from g' as from anything else.
+    """
+    better = _corrected(model, state, route, result)
+    if better is None or state is None:
+        return False
+    try:
+        moved, _ = adjoint_at(model, state, better.v * (1.0 + CANCELLED * np.finfo(np.float64).eps))
+    except RoutesError:
+        return False
+    return norm2(np.asarray(result.gradient) - better.gradient) > norm2(moved - better.gradient)
+
+
+def _corrected(model: Model, state: State | None, route: Route, result: Result) -> Corrected | None:
+    if route.accuracy > 0.0 or Offers.LINEARIZE not in model.problem.offers or state is None:
+        return None
+    try:
+        return error_bar(model, state, state.u if result.u is None else np.asarray(result.u), result.lam)
+    except RoutesError:
+        return None

@@ -21,7 +21,7 @@ from gradient_routes.bench.cases.sources import Stamp, changed
 from gradient_routes.bench.cases.status import FOREIGN, Failure, NonFinite, Status
 from gradient_routes.bench.execution.case_context import CaseContext
 from gradient_routes.bench.execution.cost_model import contained, summary
-from gradient_routes.bench.execution.error_estimate import error_estimate
+from gradient_routes.bench.execution.error_estimate import beyond_rounding, error_estimate
 from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
@@ -295,11 +295,12 @@ def _judge(context: CaseContext, route: Route, record: Record, g: Array) -> None
 
 def _estimate(context: CaseContext, route: Route, record: Record, result: Result) -> None:
     """The estimated error, and a warning where it is large though the error, relative to the terms of J, is not."""
-    estimate = error_estimate(context.model(), context.price()[1], route, result)
+    solved = context.model(), context.price()[1]
+    estimate = error_estimate(*solved, route, result)
     record.add({"gradient_error_estimate": estimate})
-    known = record.known.get("gradient_error")
-    if _converged(context, record) and estimate is not None and estimate > WRONG and not (known or 0.0) > WRONG:
-        record.note(f"{route.name}: the estimated error is {estimate:.2g} of the gradient: wrong, or rounding beside J")
+    unseen = estimate is not None and estimate > WRONG >= (record.known.get("gradient_error") or 0.0)
+    if unseen and _converged(context, record) and beyond_rounding(*solved, route, result):
+        record.note(f"{route.name}: the estimated error is {estimate:.2g} of the gradient: do not use it")
 
 
 def _converged(context: CaseContext, record: Record) -> bool:
