@@ -190,9 +190,10 @@ class Unrolled:
         objection = self.route.objection(self.problem, **given)
         if objection is not None:
             raise InputError(f"unrolling: {objection}")
+        self.model = Model(self.problem)  # for every k: JAX traces R and J once
         self.newton = None
         if self.inner != "direct" and not self.problem.linear:
-            self.newton = Model(self.problem).solve(self.p).work.newton_iterations
+            self.newton = self.model.solve(self.p).work.newton_iterations
 
     def implicit_error(self) -> float | None:
         implicit: Route = registry.find("route", "implicit-ad").load()
@@ -235,7 +236,7 @@ class Unrolled:
         every = self.iterate(few.iterations)
         if every.status != "ok" or not (every.products and few.products and every.tape_bytes and few.tape_bytes):
             return curve
-        gradients = [self._prepare(few.iterations, c)[1] for c in (curve.checkpoint, None)]
+        gradients = [self._prepare(few.iterations, c) for c in (curve.checkpoint, None)]
         for gradient in gradients:
             gradient(self.p)
         ratio = rounds(lambda: gradients[0](self.p), lambda: gradients[1](self.p), MIN_TIME).ratio
@@ -254,8 +255,8 @@ class Unrolled:
         if reason is not None:
             return Iterate(checkpoint, k, self.newton, "skipped", reason)
         try:
-            model, gradient = self._prepare(k, checkpoint)
-            result, products = gradient(self.p), model.tally.work.matvecs
+            gradient, before = self._prepare(k, checkpoint), self.model.tally.work
+            result, products = gradient(self.p), (self.model.tally.work - before).matvecs
             price, _ = price_of(lambda: gradient(self.p))
             errors = self.bench.errors(self.route, result)
         except Exception as failure:
@@ -266,10 +267,9 @@ class Unrolled:
     def _options(self, k: int, checkpoint: int | None) -> Options:
         return {"inner": self.inner, "iterations": k, "newton": self.newton, "checkpoint": checkpoint}
 
-    def _prepare(self, k: int, checkpoint: int | None) -> tuple[Model, Gradient]:
-        model = Model(self.problem)
-        function = self.route.function(model, self.p, **self._options(k, checkpoint))
-        return model, lambda q: Result(*function(q))
+    def _prepare(self, k: int, checkpoint: int | None) -> Gradient:
+        function = self.route.function(self.model, self.p, **self._options(k, checkpoint))
+        return lambda q: Result(*function(q))
 
     def _unaffordable(self, options: Options) -> str | None:
         own = self.bench.prices
