@@ -50,7 +50,7 @@ def test_the_bars_v_curve_is_as_the_textbook_draws_it(cli) -> None:
 
 def test_the_blocks_v_curve_reaches_nine_digits(cli) -> None:
     sweep = ("--steps", "1e-9", "1e-2", "--per-decade", "2", "--components", "1", "--directions", "1")
-    answer = verdict(cli("vcurve", "--problem", "block", "--route", "adjoint", *sweep, "--json"))
+    answer = verdict(cli("vcurve", "--problem", "block[n=2]", "--route", "adjoint", *sweep, "--json"))
     assert answer["verdict"] == "agrees"
     assert answer["floor"] <= 1e-9
 
@@ -84,7 +84,7 @@ def test_a_verdict_is_shown_with_its_curve_and_evidence(cli) -> None:
 
 
 def test_a_long_sweep_is_refused_with_its_bill(cli) -> None:
-    ran = cli("vcurve", "--problem", "block", "--route", "adjoint", "--budget", "1e-3", "--no-store")
+    ran = cli("vcurve", "--problem", "block[n=2]", "--route", "adjoint", "--budget", "1e-3", "--no-store")
     assert (ran.code, ran.out) == (2, "")
     assert "forward solves are predicted to take" in ran.err
     assert "--budget inf" in ran.err
