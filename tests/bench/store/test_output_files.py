@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from commands import shell, with_routes
+from commands import shell
+from forks import NOBODY, Forks
 
 from gradient_routes.bench.store import replacing
 from gradient_routes.bench.store.output_files import Output, read_by
@@ -41,12 +43,12 @@ class Power(Problem):
 """
 RUN = "run --problem prob.py:Power --route fd-central --no-timing --store s.sqlite"
 CHECK = "check prob.py:Power --no-plot --store s.sqlite"
-BLOCK = "run --problem block[n=1] --route tangent --no-timing --at p.csv --store s.sqlite"
+FIELD = "run --problem advection[n=2] --route tangent --no-timing --no-isolate --store s.sqlite"
 OPTIONS = {
     "--gradient": f"{RUN} --gradient",
-    "--vtu": f"{BLOCK} --vtu",
-    "--sensitivities": f"{BLOCK} --sensitivities",
-    "identify --vtu": "identify --problem block[n=1] --at p.csv --store s.sqlite --vtu",
+    "--vtu": f"{FIELD} --vtu",
+    "--sensitivities": f"{FIELD} --sensitivities",
+    "identify --vtu": "identify --problem advection[n=2] --store s.sqlite --vtu",
     "check --html": f"{CHECK} --html",
     "vcurve --html": "vcurve --problem bar[n=1] --route adjoint --at p.csv --no-plot --store s.sqlite --html",
     "export -o": "export --store s.sqlite -o",
@@ -59,16 +61,23 @@ ENDS = dict(
 )
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, forks: Forks) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "prob.py").write_text(PROBLEM)
+    (folder / "adjacent.py").write_text("POWER = 2\n")
+    (folder / "p.csv").write_text("log E\n1.0\n")
+    (folder / "notes.doc").write_text("of mine")
+    for words in (RUN, "baseline --store s.sqlite -o base.json"):
+        done = forks.run(folder, *words.split())
+        assert done.code == 0, done.err
+    return folder
+
+
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(made: Path, tmp_path: Path) -> Path:
     """A problem in a file, what it imports, a store, a baseline of it and a file of its own."""
-    (tmp_path / "prob.py").write_text(PROBLEM)
-    (tmp_path / "adjacent.py").write_text("POWER = 2\n")
-    (tmp_path / "p.csv").write_text("log E\n1.0\n")
-    (tmp_path / "notes.doc").write_text("of mine")
-    done = shell(f"routes {RUN} && routes baseline --store s.sqlite -o base.json", tmp_path)
-    assert done.returncode == 0, done.stderr
-    return tmp_path
+    return shutil.copytree(made, tmp_path, dirs_exist_ok=True)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -117,60 +126,59 @@ def test_every_option_replaces_its_own_and_leaves_nothing_else(folder: Path, cli
 
 
 @pytest.mark.parametrize("option", OPTIONS)
-def test_what_cannot_be_written_is_one_line_and_the_store_is_whole(folder: Path, option: str) -> None:
-    command = ["routes", *OPTIONS[option].split()]
+def test_what_cannot_be_written_is_one_line_and_the_store_is_whole(folder: Path, forks: Forks, option: str) -> None:
     rows = len(Store(folder / "s.sqlite").rows())
     kept = option in ("--gradient", "--vtu", "--sensitivities")
     (folder / f"full{ENDS[option]}").symlink_to("/dev/full")
-    words = [*command, f"full{ENDS[option]}"]
-    full = subprocess.run(words, cwd=folder, env=with_routes(), capture_output=True, text=True)
-    assert (full.returncode, full.stderr.count("\n")) == (1, 1), full.stderr
-    assert f"full{ENDS[option]}: No space left on device - name a file you may write" in full.stderr
+    full = forks.run(folder, *OPTIONS[option].split(), f"full{ENDS[option]}")
+    assert (full.code, full.err.count("\n")) == (1, 1), full.err
+    assert f"full{ENDS[option]}: No space left on device - name a file you may write" in full.err
     assert len(Store(folder / "s.sqlite").rows()) == rows + kept
-    reading, writing = os.pipe()
-    os.close(reading)
-    (folder / f"pipe{ENDS[option]}").symlink_to(f"/dev/fd/{writing}")
-    closed = subprocess.run([*command, f"pipe{ENDS[option]}"], cwd=folder, env=with_routes(), capture_output=True,
-                            text=True, pass_fds=[writing])  # fmt: skip
-    os.close(writing)
+    (folder / f"pipe{ENDS[option]}").symlink_to(f"/dev/fd/{NOBODY}")
+    closed = forks.run(folder, *OPTIONS[option].split(), f"pipe{ENDS[option]}")
     if option in ("identify --vtu", "check --html", "vcurve --html"):  # in a process of its own, which has no such file
-        assert closed.returncode in (1, 2)
+        assert closed.code in (1, 2)
     else:
-        assert (closed.returncode, "Broken pipe" in closed.stderr) == (1, True), closed.stderr
-    assert "Traceback" not in closed.stderr
-    assert closed.stderr.count("\n") == 1
+        assert (closed.code, "Broken pipe" in closed.err) == (1, True), closed.err
+    assert "Traceback" not in closed.err
+    assert closed.err.count("\n") == 1
 
 
 @pytest.mark.parametrize("verb", ["list", "report", "status", "export", "export --format json", RUN, f"{RUN} --json",
                                   "compare base.json s.sqlite", f"{CHECK}", "report --format md"])  # fmt: skip
-def test_stdout_that_is_full_or_closed_is_no_traceback(folder: Path, verb: str) -> None:
+def test_stdout_that_is_full_or_closed_is_no_traceback(folder: Path, forks: Forks, verb: str) -> None:
     where = "" if "--store" in verb or verb.startswith(("list", "compare")) else " --store s.sqlite"
-    full = shell(f"routes {verb}{where} > /dev/full", folder)
-    assert (full.returncode, full.stderr.count("\n")) == (1, 1), full.stderr
-    assert "No space left on device" in full.stderr
-    closed = shell(f"routes {verb}{where} | true", folder)
-    assert "Traceback" not in closed.stderr
-    assert closed.stderr.count("\n") <= 1
+    full = forks.run(folder, *f"{verb}{where}".split(), stdout="/dev/full")
+    assert (full.code, full.err.count("\n")) == (1, 1), full.err
+    assert "No space left on device" in full.err
+    closed = forks.run(folder, *f"{verb}{where}".split(), stdout=None)
+    assert "Traceback" not in closed.err
+    assert closed.err.count("\n") <= 1
     assert len(Store(folder / "s.sqlite").rows()) >= 1
 
 
-def test_a_closed_stdout_costs_no_file(folder: Path) -> None:
-    shell(f"routes {RUN} --json --gradient g.csv | true", folder)
+def test_a_closed_stdout_costs_no_file(folder: Path, forks: Forks) -> None:
+    forks.run(folder, *f"{RUN} --json --gradient g.csv".split(), stdout=None)
     assert (folder / "g.csv").read_text().startswith("problem,route")
 
 
-def test_stdout_and_pipes_are_written_as_they_are(folder: Path) -> None:
-    table = shell("routes export --store s.sqlite", folder).stdout
+def test_stdout_and_pipes_are_written_as_they_are(folder: Path, forks: Forks) -> None:
+    """Of the shell, one of each."""
+    table = forks.run(folder, *"export --store s.sqlite".split()).out
     assert table.startswith("case_id,")
-    for command in ("-o /dev/stdout", "-o /dev/stdout > all && cat all", "-o /dev/stdout | cat"):
+    for command in ("-o /dev/stdout", "-o /dev/stdout | cat"):
         done = shell(f"routes export --store s.sqlite {command}", folder)
         assert done.stdout == table, command
-    assert shell("mkfifo p; cat p & routes export --store s.sqlite -o p; wait", folder).stdout == table
-    assert shell("routes export --store s.sqlite -o /dev/null", folder).returncode == 0
-    done = shell(f"routes {RUN} --gradient /dev/stdout > all", folder)
-    assert done.returncode == 0
-    assert (folder / "all").read_text().count("problem,route") == 1
-    assert "gradients of 1 of 1 cases in /dev/stdout" in (folder / "all").read_text()
+    assert forks.run(folder, *"export --store s.sqlite -o /dev/stdout".split()).out == table, "a file"
+    os.mkfifo(folder / "p")
+    with subprocess.Popen(["cat", "p"], cwd=folder, stdout=subprocess.PIPE, text=True) as reader:
+        assert forks.run(folder, *"export --store s.sqlite -o p".split()).code == 0
+        assert reader.communicate()[0] == table
+    assert forks.run(folder, *"export --store s.sqlite -o /dev/null".split()).code == 0
+    done = forks.run(folder, *f"{RUN} --gradient /dev/stdout".split())
+    assert done.code == 0
+    assert done.out.count("problem,route") == 1
+    assert "gradients of 1 of 1 cases in /dev/stdout" in done.out
 
 
 @pytest.fixture
