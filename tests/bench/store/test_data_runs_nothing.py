@@ -12,7 +12,8 @@ from pathlib import Path
 
 import click
 import pytest
-from commands import ROOT, shell
+from commands import ROOT
+from forks import Forks
 
 from gradient_routes.bench.cli import main
 from gradient_routes.bench.store.store import Store
@@ -26,9 +27,8 @@ from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Offers, route
 
-if os.environ.get("MARK") == "write":
-    open(os.environ["MARKED"], "a").write(__name__)
 if os.environ.get("MARK") == "exit":
+    open(os.environ.get("MARKED", os.devnull), "a").write(__name__)
     os._exit(0)
 
 
@@ -49,22 +49,22 @@ status = "timeout"
 reason = "names code, too"
 """
 MEASURED = (
-    "routes run --problem 'mine.py:Mine[n=2|3]' --problem minemod:Mine --route mine.py:way --route adjoint --no-timing"
-    " && routes scaling --problem 'mine.py:Mine[n=2|4|8]' --route mine.py:way --route minemod:way --min-time 0"
-    " && routes tolerance --problem mine.py:Mine --route mine.py:way --route adjoint --per-decade 1 --tightest 1e-4"
-    " && routes check --problem mine.py:Mine --route mine.py:way --no-plot"
-    " && routes baseline -o baseline.json"
+    "run --problem mine.py:Mine[n=2|3] --problem minemod:Mine --route mine.py:way --route adjoint --no-timing",
+    "scaling --problem mine.py:Mine[n=2|4|8] --route mine.py:way --route minemod:way --min-time 0",
+    "tolerance --problem mine.py:Mine --route mine.py:way --route adjoint --per-decade 1 --tightest 1e-4",
+    "check --problem mine.py:Mine --route mine.py:way --no-plot",
 )
 
 
 @pytest.fixture(scope="module")
-def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sent(tmp_path_factory: pytest.TempPathFactory, forks: Forks) -> Path:
     """A folder with a store and a baseline that name a file and a module."""
     folder = tmp_path_factory.mktemp("sent")
     for name in ("mine.py", "minemod.py"):
         (folder / name).write_text(CODE)
-    done = shell(MEASURED, folder, PYTHONPATH=str(folder))
-    assert done.returncode == 0, done.stderr
+    for command in (*(f"{measured} --no-isolate" for measured in MEASURED), "baseline -o baseline.json"):
+        done = forks.run(folder, *command.split(), PYTHONPATH=str(folder))
+        assert done.code == 0, done.err
     (folder / "results" / "expected.toml").write_text(EXPECTED)
     return folder
 
@@ -119,37 +119,36 @@ def read(folder: Path, at: Path, mark: str) -> list[tuple[int, str, str]]:
 
 
 def test_no_verb_runs_code_that_a_store_or_a_baseline_names(sent: Path, tmp_path: Path) -> None:
-    found = {mark: read(sent, tmp_path / mark, mark) for mark in ("nothing", "write", "exit")}
+    found = {mark: read(sent, tmp_path / mark, mark) for mark in ("nothing", "exit")}
     words = reading(sent)
     assert {"list", "status", "report", "export", "compare", "baseline", "run"} <= {one[0] for one in words}
-    for mark in ("write", "exit"):
-        for given, plain, marked in zip(words, found["nothing"], found[mark], strict=True):
-            if "--resume" not in given:  # these measure anew
-                assert plain[0] in (0, 1), plain
-                assert marked == plain, given
-    report = dict(zip(map(tuple, words), found["write"], strict=True))["report",]
+    for given, plain, marked in zip(words, found["nothing"], found["exit"], strict=True):
+        if "--resume" not in given:  # these measure anew
+            assert plain[0] in (0, 1), plain
+            assert marked == plain, given
+    report = dict(zip(map(tuple, words), found["exit"], strict=True))["report",]
     assert "minemod:Mine: n_u = 2" in report[1], "defaults are left out as they were when it ran"
 
 
-def test_a_gate_fails_whatever_its_data_name(sent: Path) -> None:
+def test_a_gate_fails_whatever_its_data_name(sent: Path, forks: Forks) -> None:
     """A module that ends the process does not make it pass."""
     with sqlite3.connect(sent / "results" / "routes.sqlite") as db:
         db.execute("VACUUM INTO ?", (str(sent / "worse.sqlite"),))
     with sqlite3.connect(sent / "worse.sqlite") as db:
         db.execute("UPDATE cases SET status = 'failed' WHERE problem LIKE '%:%'")
     for mark in ("nothing", "exit"):
-        done = shell("routes compare baseline.json worse.sqlite", sent, PYTHONPATH=str(sent), MARK=mark)
-        assert done.returncode == 1, done.stdout
-        assert "a regression" in done.stdout
+        done = forks.run(sent, "compare", "baseline.json", "worse.sqlite", PYTHONPATH=str(sent), MARK=mark)
+        assert done.code == 1, done.out
+        assert "a regression" in done.out
 
 
-def test_changes_of_code_are_seen_without_running_it(sent: Path, tmp_path: Path) -> None:
+def test_changes_of_code_are_seen_without_running_it(sent: Path, tmp_path: Path, forks: Forks) -> None:
     folder = tmp_path / "changed"
     shutil.copytree(sent, folder)
 
     def seen() -> set[str]:
-        done = shell("routes status --json", folder, PYTHONPATH=str(folder), MARK="exit")
-        rows = [json.loads(line) for line in done.stdout.splitlines()]
+        done = forks.run(folder, "status", "--json", PYTHONPATH=str(folder), MARK="exit")
+        rows = [json.loads(line) for line in done.out.splitlines()]
         return {row["state"] for row in rows if row["problem"] == "mine.py:Mine"}
 
     assert seen() == {"current"}
@@ -159,7 +158,7 @@ def test_changes_of_code_are_seen_without_running_it(sent: Path, tmp_path: Path)
     assert seen() == {"gone"}
 
 
-def test_a_store_of_an_older_version_shows_what_it_can(sent: Path, tmp_path: Path) -> None:
+def test_a_store_of_an_older_version_shows_what_it_can(sent: Path, tmp_path: Path, forks: Forks) -> None:
     old = tmp_path / "old.sqlite"
     shutil.copy(sent / "results" / "routes.sqlite", old)
     with sqlite3.connect(old) as db:
@@ -173,11 +172,11 @@ def test_a_store_of_an_older_version_shows_what_it_can(sent: Path, tmp_path: Pat
         (f"report --store {old} --format md", "mine.py:Mine[n=2]"),
         (f"compare {old} {old}", "mine.py:Mine[n=2]"),
     ):
-        done = shell(f"routes {verb}", sent, PYTHONPATH=str(sent), MARK="exit", COLUMNS="200")
-        assert done.returncode == 0, done.stderr
-        assert shown in done.stdout.replace("\\", ""), done.stdout
-        assert done.stdout.count("kept by an older version") == 1 + verb.startswith("compare"), done.stdout
-    lines = shell(f"routes status --json --store {old}", sent, PYTHONPATH=str(sent), MARK="exit").stdout.splitlines()
+        done = forks.run(sent, *verb.split(), PYTHONPATH=str(sent), MARK="exit", COLUMNS="200")
+        assert done.code == 0, done.err
+        assert shown in done.out.replace("\\", ""), done.out
+        assert done.out.count("kept by an older version") == 1 + verb.startswith("compare"), done.out
+    lines = forks.run(sent, *f"status --json --store {old}".split(), PYTHONPATH=str(sent), MARK="exit").out.splitlines()
     assert {row["state"] for row in map(json.loads, lines)} == {"unchecked"}
     Store(old).append_study("check", {}, "now")  # and it is migrated
     assert "problem_declared" in Store(old).table("cases")[0]

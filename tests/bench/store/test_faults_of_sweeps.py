@@ -18,9 +18,10 @@ TABLE = "problem,route,parameter\nbar[n=2],adjoint,a\nbar[n=2],adjoint,b\nbar[n=
 
 
 def test_nothing_is_lost_repeated_half_written_or_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of every kind one; one strikes a runner with processes for its cases, one a runner of three."""
     monkeypatch.setattr(faults, "CASES", 12)
-    found = sum(faults.faults(6, random.Random(1)).values(), Found())
-    assert found.faults >= 6
+    found = sum(faults.faults(5, random.Random(14)).values(), Found())
+    assert found.faults >= 5
     assert found.well, found
 
 

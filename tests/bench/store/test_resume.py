@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import json
+import shlex
 import sqlite3
 import subprocess
 from collections import Counter
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 from commands import PATIENCE, Ran, shell, with_routes
+from forks import Forks
 
 from benchmarks.faults import sound
 from gradient_routes.bench.cases import environment, keys, sources
@@ -49,40 +51,41 @@ def plugin(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def routes(folder: Path, *arguments: str, before: str = "") -> Ran:
-    command = ["bash", "-c", f'{before}exec routes run --no-isolate --min-time 0 --json "$@"', "routes", *arguments]
-    done = subprocess.run(command, cwd=folder, env=with_routes(), capture_output=True, text=True, timeout=PATIENCE)
-    return Ran(done.returncode, done.stdout, done.stderr)
+RUN = ("run", "--no-isolate", "--min-time", "0", "--json")
 
 
-def ran(folder: Path, *arguments: str) -> list[str]:
-    """Which cases were run again, by route and n."""
-    options = ("--problem", "model.py:Model[n=2|3]", "--route", "fd-central", "--route", "fd-one-sided")
-    done = routes(folder, *options, *arguments)
-    assert done.code == 0, done.err
-    return sorted(f"{row['route']} {row['n_param']}" for row in done.rows)
+def running(forks: Forks, folder: Path) -> Callable[..., list[str]]:
+    def ran(*arguments: str) -> list[str]:
+        """Which cases were run again, by route and n."""
+        options = ("--problem", "model.py:Model[n=2|3]", "--route", "fd-central", "--route", "fd-one-sided")
+        done = forks.run(folder, *RUN, *options, *arguments)
+        assert done.code == 0, done.err
+        return sorted(f"{row['route']} {row['n_param']}" for row in done.rows)
+
+    return ran
 
 
 CASE = ("run", "--json", "--min-time", "0", "--problem", "model.py:Model", "--route", "fd-central")
 ALL = ["fd-central 2", "fd-central 3", "fd-one-sided 2", "fd-one-sided 3"]
 
 
-def test_an_answer_is_stale_once_anything_that_it_rests_on_has_changed(plugin: Path) -> None:
-    assert ran(plugin) == ALL
-    assert ran(plugin, "--resume") == []
+def test_an_answer_is_stale_once_anything_that_it_rests_on_has_changed(plugin: Path, forks: Forks) -> None:
+    ran = running(forks, plugin)
+    assert ran() == ALL
+    assert ran("--resume") == []
     (plugin / "other.py").write_text("OTHER = 2\n")
     (plugin / "README").write_text("of no consequence")
     (plugin / "model.py").touch()
-    assert ran(plugin, "--resume") == [], "what it does not import is nothing to it, nor is a date"
+    assert ran("--resume") == [], "what it does not import is nothing to it, nor is a date"
     (plugin / "model.py").write_text(MODEL.replace("float((", "float(3 * ("))
-    assert ran(plugin, "--only", "missing") == ran(plugin, "--only", "failed") == []
-    assert ran(plugin, "--resume") == ALL
+    assert ran("--only", "missing") == ran("--only", "failed") == []
+    assert ran("--resume") == ALL
     (plugin / "power.py").write_text("POWER = 3\n")
-    assert ran(plugin, "--only", "stale") == ALL
-    assert ran(plugin, "--only", "stale") == []
+    assert ran("--only", "stale") == ALL
+    assert ran("--only", "stale") == []
     (plugin / "data.csv").write_text("2\n")
-    assert ran(plugin, "--only", "all", "--problem", "model.py:Model[n=2]") == ALL
-    assert ran(plugin, "--resume") == []
+    assert ran("--only", "all", "--problem", "model.py:Model[n=2]") == ALL
+    assert ran("--resume") == []
     assert len(Store(plugin / "results" / "routes.sqlite").rows()) == 16, "nothing is replaced"
 
 
@@ -199,16 +202,17 @@ def test_two_runners_of_one_sweep_lose_no_row(plugin: Path) -> None:
     assert len({row["case_key"] for row in rows}) == 10
 
 
-def test_a_full_disk_loses_no_printed_row_and_harms_no_store(plugin: Path) -> None:
+def test_a_full_disk_loses_no_printed_row_and_harms_no_store(plugin: Path, forks: Forks) -> None:
     sizes = [*range(50, 60)]
     sweep = ("--problem", f"model.py:Model[n={'|'.join(map(str, sizes))}]", "--route", "fd-central", "--resume")
-    assert routes(plugin, "--problem", "model.py:Model[n=50]", "--route", "fd-central").code == 0
+    assert forks.run(plugin, *RUN, "--problem", "model.py:Model[n=50]", "--route", "fd-central").code == 0
     store = Store(plugin / "results" / "routes.sqlite")
     before = store.rows()
     while store.path.stat().st_size < 2**18:  # what others have measured, more than is kept apart
         store.append_all([(empty_row(), None, None)] * 50)
-    others, blocks = len(store.rows()) - 1, store.path.stat().st_size // 1024
-    full = routes(plugin, *sweep, before=f"ulimit -f {blocks}; ")
+    others, blocks = len(store.rows()) - 1, store.path.stat().st_size // 512
+    done = shell(f"ulimit -f {blocks}; exec routes {shlex.join((*RUN, *sweep))}", plugin)
+    full = Ran(done.returncode, done.stdout, done.stderr)
     assert full.code == 1
     assert [row["n_param"] for row in full.rows] == sizes[1:], "what is measured is printed"
     assert full.err.count("\n") == 2
@@ -221,19 +225,20 @@ def test_a_full_disk_loses_no_printed_row_and_harms_no_store(plugin: Path) -> No
     assert [row["n_param"] for row in Store(apart).rows()] == sizes[kept:]
     merge = full.err.partition("later: ")[2].splitlines()[0]
     assert shell(merge, plugin).stdout.startswith(f"{waiting} cases and 0 studies")
-    assert routes(plugin, *sweep).rows == []
+    assert forks.run(plugin, *RUN, *sweep).rows == []
     assert len(store.rows()) == others + len(sizes)
 
 
-def test_a_row_of_an_older_schema_is_missing(plugin: Path) -> None:
+def test_a_row_of_an_older_schema_is_missing(plugin: Path, forks: Forks) -> None:
     """It has no key: what it was an answer to is not known."""
-    assert ran(plugin) == ALL
+    ran = running(forks, plugin)
+    assert ran() == ALL
     with closing(sqlite3.connect(plugin / "results" / "routes.sqlite")) as db:
         for statement in ("DROP INDEX by_case", "ALTER TABLE cases DROP COLUMN case_key", "PRAGMA user_version = 3"):
             db.execute(statement)
         db.commit()
-    assert ran(plugin, "--resume") == ALL
-    assert ran(plugin, "--resume") == []
+    assert ran("--resume") == ALL
+    assert ran("--resume") == []
 
 
 WATCH = """from pathlib import Path
@@ -248,10 +253,10 @@ class Model(model.Model):
 """
 
 
-def test_a_source_that_changes_while_it_runs_gives_no_row_under_its_old_name(plugin: Path) -> None:
+def test_a_source_that_changes_while_it_runs_gives_no_row_under_its_old_name(plugin: Path, forks: Forks) -> None:
     """What ran of the other code is no answer of this one."""
     (plugin / "watch.py").write_text(WATCH)
-    done = shell("routes run --json --no-timing --problem watch.py:Model --route fd-central", plugin)
-    row = json.loads(done.stdout)
+    done = forks.run(plugin, *"run --json --no-timing --problem watch.py:Model --route fd-central".split())
+    (row,) = done.rows
     assert row["status"] == "failed"
     assert "watch.py has changed since the run began - run it again" in row["reason"]
