@@ -34,6 +34,7 @@ import pytest
 from click.testing import CliRunner
 from commands import Ran, Shell
 from duffing.problem import Duffing
+from forks import Forks
 
 from gradient_routes.bench.cli import main
 from gradient_routes.problems.advection import Advection
@@ -138,6 +139,14 @@ def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         return Ran(result.exit_code, result.stdout, result.stderr)
 
     return call
+
+
+@pytest.fixture(scope="session")
+def forks() -> Iterator[Forks]:
+    """Commands in processes of their own that need not import anything first."""
+    forks = Forks()
+    yield forks
+    forks.end()
 
 
 @pytest.fixture

@@ -109,19 +109,32 @@ def imported_names(file: Path, root: Path) -> Iterator[str]:
     """Dotted names that a file imports anywhere, relative ones resolved; of `from a import b` both a and a.b, of
     `import a` and `from a import *` also a.*.
     """
-    try:
-        tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # it will say so itself when it is imported
-        return
     package = file.parent.relative_to(root).parts if file.is_relative_to(root) else ()
-    for node in ast.walk(tree):
+    for node in _imports(file.read_bytes()):
         if isinstance(node, ast.Import):
             yield from (name for alias in node.names for name in (alias.name, f"{alias.name}.*"))
-        elif isinstance(node, ast.ImportFrom):
+        else:
             above = package[: len(package) - node.level + 1] if node.level else ()
             base = ".".join([*above, *([node.module] if node.module else [])])
             yield base
             yield from (f"{base}.{alias.name}".lstrip(".") for alias in node.names)
+
+
+@cache
+def _imports(code: bytes) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """Anywhere among the statements of a file: most of its nodes are of expressions, which have none."""
+    try:
+        waiting: list[ast.AST] = [ast.parse(code)]
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # it will say so itself when it is imported
+        return ()
+    found = []
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            found.append(node)
+        else:
+            waiting += (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr))
+    return tuple(found)
 
 
 def defined_in(name: str) -> Iterable[str]:

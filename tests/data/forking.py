@@ -11,6 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import gradient_routes.bench.cli
+import gradient_routes.bench.execution.executors.in_process
+import gradient_routes.bench.execution.executors.isolated
+import gradient_routes.bench.studies.bill.done
+import gradient_routes.bench.studies.bill.view
 import gradient_routes.problems.advection
 import gradient_routes.problems.bar
 import gradient_routes.routes.adjoint

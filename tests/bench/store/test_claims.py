@@ -71,9 +71,9 @@ def begun(folder: Path) -> Counter[int]:
     return Counter(int(path.name.split("-")[1]) for path in folder.glob("begun-*"))
 
 
-@pytest.mark.parametrize("options", [(), ("--jobs", "2"), ("--no-isolate",)])
+@pytest.mark.parametrize("options", [("--jobs", "2"), ("--no-isolate",)])
 def test_three_runners_at_once_run_every_case_once(folder: Path, options: tuple[str, ...]) -> None:
-    """The one that fails, too."""
+    """The one that fails, too. Those with a process at a time are below."""
     runners = [runner(folder, *options) for _ in range(3)]
     eventually(lambda: len(begun(folder)) >= 3)
     open_gates(folder)
@@ -100,12 +100,12 @@ def test_the_case_of_a_runner_that_is_killed_is_run_by_another(folder: Path) -> 
 
 def test_a_runner_that_has_done_all_else_waits_for_the_cases_of_others(folder: Path) -> None:
     """So that the sweep is complete when any of them ends, whoever is killed meanwhile."""
-    slow = runner(folder)
+    slow = runner(folder, "--no-isolate")
     eventually(lambda: bool(begun(folder)))
     (held,) = begun(folder)
     for n in {*SIZES} - {held}:
         (folder / f"gate-{n}").touch()
-    other = runner(folder)
+    other = runner(folder, "--no-isolate")
     assert other.stderr is not None
     assert other.stderr.readline() == "routes: 1 case is run by another - waiting for it, interrupt to leave it\n"
     slow.send_signal(signal.SIGKILL)
