@@ -23,7 +23,7 @@ VARIANTS = [
     *({"law": law, "derivatives": "hand"} for law in LAWS[:2]),
     {"load": "follower"},
 ]
-TINY = 10.0 ** -np.arange(4, 21, 2.0)
+TINY = (1e-4, 1e-20)  # every load compiles a block of its own; test_materials has the stresses between them
 
 
 def gradient(t: float, route: Route = adjoint, **options) -> np.ndarray:
@@ -61,7 +61,7 @@ def limit() -> np.ndarray:
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda options: "-".join(options.values()))
 def test_the_gradient_over_the_load_goes_to_that_of_linear_elasticity(options: dict[str, str]) -> None:
-    """From 1e-2 to 1e-20: off by O(load), to 1e-10 and better where that is nothing."""
+    """At 1e-2, 1e-4 and 1e-20: off by O(load), to 1e-12 where that is nothing."""
     nonlinear = relative_error(gradient(1e-2, **options), limit()) / 1e-2
     assert nonlinear < 5.0
     for load in TINY:
@@ -69,8 +69,7 @@ def test_the_gradient_over_the_load_goes_to_that_of_linear_elasticity(options: d
 
 
 def test_the_gradient_by_jax_keeps_its_digits_at_tiny_loads() -> None:
-    for load in (1e-12, 1e-16):
-        assert relative_error(gradient(load, implicit_ad), limit()) < 1e-10
+    assert relative_error(gradient(1e-16, implicit_ad), limit()) < 1e-10
 
 
 def test_a_grip_that_hardly_moves_gives_the_gradient_of_linear_elasticity() -> None:
@@ -80,6 +79,6 @@ def test_a_grip_that_hardly_moves_gives_the_gradient_of_linear_elasticity() -> N
         return adjoint.prepare(Model(block), p)(p).gradient / moved
 
     exact = by("linear", 1e-3)  # quadratic in the displacement beside the target: next to nothing
-    for moved in (1e-12, 1e-16):
-        assert relative_error(by("neo-hookean", moved), by("linear", moved)) < 1e-10
-        assert relative_error(by("linear", moved), exact) < 1e-2
+    moved = 1e-16
+    assert relative_error(by("neo-hookean", moved), by("linear", moved)) < 1e-10
+    assert relative_error(by("linear", moved), exact) < 1e-2
