@@ -17,7 +17,7 @@ from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Route
 
-LAWS = ("neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear")
+LAWS = ("neo-hookean", "mooney-rivlin", "yeoh", "linear")
 VARIANTS = [
     *({"law": law} for law in LAWS),
     *({"law": law, "derivatives": "hand"} for law in LAWS[:2]),
