@@ -38,9 +38,9 @@ SMALL: dict[str, Any] = {"nx": 1, "ny": 2, "nz": 2}
 # law, linear elasticity, which is traced in a fraction of the time
 VARIANTS: dict[str, dict[str, Any]] = {
     "layers": {"unknown": "layers", "layers": 2, "law": "linear"},
-    "constants": {"unknown": "constants", "law": "linear"},
+    "constants": {"unknown": "constants"},
     "twin traction": {"unknown": "traction", "data": "twin", "size": "2", "law": "linear"},
-    "tet10 shape": {"unknown": "shape", "element": "tet10", "ny": 1, "nz": 1, "surface": "right", "law": "linear"},
+    "tet10 shape": {"unknown": "shape", "element": "tet10", "ny": 1, "nz": 1, "surface": "right"},
     "load": {"unknown": "load"},
     "yeoh": {"law": "yeoh"},
     "ogden": {"law": "ogden", "unknown": "constants"},
