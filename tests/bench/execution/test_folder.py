@@ -12,17 +12,28 @@ MOVES = """
 import os
 from pathlib import Path
 
-from gradient_routes.problems.block import Block
+from gradient_routes.problems.bar import Bar
 from gradient_routes.routes.adjoint import adjoint
 
 Path("elsewhere").mkdir(exist_ok=True)
 os.chdir("elsewhere")
 
 
-class Moved(Block):
-    def __init__(self, *, n: int = 2, probes: str = "") -> None:
-        assert Path.cwd().name == "elsewhere", "where the file went is where it stays"
+def stays() -> None:
+    assert Path.cwd().name == "elsewhere", "where the file went is where it stays"
+
+
+class Moved(Bar):
+    def __init__(self, *, n: int = 8) -> None:
+        stays()
         super().__init__(n=n)
+
+
+def solid(*, probes: str = ""):
+    from gradient_routes.problems.block import Block
+
+    stays()
+    return Block(n=2, derivatives="hand")
 
 
 def J(p):
@@ -33,13 +44,14 @@ def dJ(p):
     return 2 * p
 """
 PROBLEM = ("--problem", "moves.py:Moved")
+SOLID = ("--problem", "moves.py:solid")  # has a mesh
 CALLS = {
-    "run": (*PROBLEM, "--route", "adjoint", "--no-timing", "--at", "p.csv", "--gradient", "g.csv", "--vtu", "f.vtu"),
+    "run": (*SOLID, "--route", "adjoint", "--no-timing", "--at", "p.csv", "--gradient", "g.csv", "--vtu", "f.vtu"),
     "check": ("--objective", "moves.py:J", "--gradient", "moves.py:dJ", "--at", "p.csv", "--html", "page.html"),
     "vcurve": (*PROBLEM, "--route", "adjoint", "--html", "page.html", "--per-decade", "2", "--steps", "1e-9", "1e-3"),
     "tolerance": (*PROBLEM, "--route", "adjoint", "--at", "p.csv", "--tightest", "1e-3", "--per-decade", "1"),
     "scaling": ("--problem", "moves.py:Moved[n=1|2]", "--route", "adjoint", "--min-time", "0"),
-    "identify": (*PROBLEM, "--noise", "0.1", "--vtu", "f.vtu"),
+    "identify": (*SOLID, "--noise", "0.1", "--vtu", "f.vtu"),
 }
 WRITTEN = {"run": ["f.vtu", "g.csv"], "check": ["page.html"], "vcurve": ["page.html"], "identify": ["f.vtu"]}
 
