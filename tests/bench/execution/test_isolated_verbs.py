@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from commands import FAULTY, Shell, ended, eventually, faulty, sigint_ignored
+from commands import FAULTY, MARK, Shell, ended, eventually, faulty, sigint_ignored
 
 from gradient_routes.bench.cases.registry import studies
 from gradient_routes.bench.command_options import FINISHED
@@ -19,30 +19,6 @@ from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies import command
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-
-VERBS = {
-    "check": (f"{FAULTY}:Sleeping",),
-    "vcurve": ("--problem", faulty(does="sleep", when=0), "--route", "fd-central"),
-    "kink": ("--problem", faulty(does="sleep", when=0)),
-    "tolerance": ("--problem", faulty(does="sleep", when=0)),
-    "unrolling": ("--problem", faulty(does="sleep", when=0)),
-}
-
-
-def test_every_verb_ends_at_its_limit(started: Shell) -> None:
-    """In one line, with an exit code and a row that says so."""
-    running = {verb: started.start(verb, *given, "--timeout", "8") for verb, given in VERBS.items()}
-    for verb, process in running.items():
-        ran = ended(process)
-        finished = f"; {FINISHED}" if studies()[verb].keeps else ""
-        says = f"routes: {verb}: timeout: after 8 s of --timeout - raise the limit, or ask for less{finished}\n"
-        assert (ran.code, ran.out, ran.err) == (1, "", says)
-    names, rows = Store(started.folder / "results" / "routes.sqlite").table("studies")
-    kept = [dict(zip(names, row, strict=True)) for row in rows]
-    assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(VERBS, "timeout")
-    assert {row["reason"] for row in kept} == {"after 8 s of --timeout"}
-    started.nothing_is_left()
-
 
 COUNTED = """
 from gradient_routes.problems.bar import Bar
@@ -72,6 +48,52 @@ def late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watching, "time", Late)
 
 
+ASLEEP = """
+from faulty import Sleeping, sleep
+from gradient_routes.problems.bar import Bar
+
+def asleep():
+    with open("gradients", "w") as file:
+        file.write(10 * ".")
+    sleep()
+
+class Check(Sleeping):
+    def objective(self, p):
+        asleep()
+
+class Asleep(Bar):
+    def __init__(self):
+        super().__init__(n=2)
+        asleep()
+"""
+SLEEPING = {
+    "check": ("asleep.py:Check",),
+    "vcurve": ("--problem", "asleep.py:Asleep", "--route", "fd-central"),
+    "kink": ("--problem", "asleep.py:Asleep"),
+    "tolerance": ("--problem", "asleep.py:Asleep"),
+    "unrolling": ("--problem", "asleep.py:Asleep"),
+}
+
+
+def test_every_verb_ends_at_its_limit(
+    late: None, cli, started: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In one line, with an exit code and a row that says so."""
+    monkeypatch.setenv(MARK, str(tmp_path))
+    (tmp_path / "faulty.py").write_text(FAULTY.read_text())
+    (tmp_path / "asleep.py").write_text(ASLEEP)
+    for verb, given in SLEEPING.items():
+        ran = cli(verb, *given, "--timeout", "1800", "--isolate")
+        finished = f"; {FINISHED}" if studies()[verb].keeps else ""
+        says = f"routes: {verb}: timeout: after 1800 s of --timeout - raise the limit, or ask for less{finished}\n"
+        assert (ran.code, ran.out, ran.err) == (1, "", says)
+        (tmp_path / "gradients").unlink()
+    kept = Store(tmp_path / "results" / "routes.sqlite").records("studies")
+    assert {row["study"]: row["status"] for row in kept} == dict.fromkeys(SLEEPING, "timeout")
+    assert {row["reason"] for row in kept} == {"after 1800 s of --timeout"}
+    started.nothing_is_left()
+
+
 @pytest.mark.parametrize("verb", ENDLESS)
 def test_what_a_verb_has_at_its_limit_is_shown_and_kept(verb: str, late: None, cli, tmp_path: Path) -> None:
     (tmp_path / "counted.py").write_text(COUNTED)
@@ -85,38 +107,36 @@ def test_what_a_verb_has_at_its_limit_is_shown_and_kept(verb: str, late: None, c
 
 
 @pytest.mark.parametrize(
-    ("given", "code", "says"),
+    ("given", "says"),
     [
-        (("check", f"{FAULTY}:Leaving"), 1, "check: crashed: its process ended with exit code 0"),
-        (("check", "--json", f"{FAULTY}:Chatty"), 0, "garbage of C"),
-        (("tolerance", "--problem", faulty(does="leave", when=0)), 1, "tolerance: crashed: its process ended with"),
-        (("tolerance", "--problem", faulty(does="quit", when=0)), 1, "routes: tolerance: SystemExit: 4 - see --debug"),
-        (("unrolling", "--problem", faulty(does="raise", when=0)), 1, "unrolling: ZeroDivisionError"),
+        (("check", f"{FAULTY}:Leaving"), "check: crashed: its process ended with exit code 0"),
+        (("tolerance", "--problem", faulty(does="leave", when=0)), "tolerance: crashed: its process ended with"),
+        (("tolerance", "--problem", faulty(does="quit", when=0)), "routes: tolerance: SystemExit: 4 - see --debug"),
+        (("unrolling", "--problem", faulty(does="raise", when=0)), "unrolling: ZeroDivisionError"),
         (
             ("vcurve", "--problem", faulty(does="take", when=0), "--route", "fd-central", "--memory", "300MB"),
-            1,
             "vcurve: out-of-memory: MemoryError: Unable to allocate",
         ),
     ],
 )
-def test_no_code_of_others_ends_a_verb_as_if_all_were_well(
-    started: Shell, given: tuple[str, ...], code: int, says: str
-) -> None:
+def test_no_code_of_others_ends_a_verb_as_if_all_were_well(cli, given: tuple[str, ...], says: str) -> None:
     """An exit code of 0 would mean that a gradient agrees."""
-    ran = started.run(*given, "--no-store")
-    assert ran.code == code, ran.err
+    ran = cli(*given, "--no-store", "--isolate")
+    assert (ran.code, ran.out) == (1, ""), ran.err
     assert says in ran.err
     assert "Traceback" not in ran.err
-    if code == 0:
-        assert json.loads(ran.out)["verdict"] == "agrees", "what C prints is no result"
-    else:
-        assert ran.out == ""
+
+
+def test_what_c_prints_is_no_result(started: Shell) -> None:
+    ran = started.run("check", "--json", "--no-store", f"{FAULTY}:Chatty")
+    assert ran.code == 0, ran.err
+    assert "garbage of C" in ran.err
+    assert json.loads(ran.out)["verdict"] == "agrees"
 
 
 @pytest.mark.parametrize(
     ("model", "name", "ignored"),
-    [(model, name, False) for model in ("Sleeping", "Stubborn") for name in ("SIGINT", "SIGTERM")]
-    + [("Sleeping", "SIGINT", True)],
+    [("Sleeping", "SIGTERM", False), ("Stubborn", "SIGINT", False), ("Sleeping", "SIGINT", True)],
 )
 def test_an_interrupted_verb_leaves_nothing_running(started: Shell, model: str, name: str, ignored: bool) -> None:
     """Also where it was started with SIGINT ignored, as what shells start in the background is."""
