@@ -7,11 +7,12 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
-from commands import FAULTY, MARK, PATIENCE, Shell, ended, eventually, faulty, words
+from commands import FAULTY, MARK, PATIENCE, Shell, ended, eventually, faulty, sigint_ignored, words
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
@@ -246,10 +247,14 @@ def test_only_the_same_pair_is_pruned() -> None:
     assert not pruned((80, 8), k=2, n=8)
 
 
-@pytest.mark.parametrize(("jobs", "name"), [("1", "SIGINT"), ("3", "SIGTERM")])
-def test_an_interrupted_run_shows_what_is_done_and_how_to_go_on(started: Shell, jobs: str, name: str) -> None:
+@pytest.mark.parametrize(("jobs", "name", "ignored"), [("1", "SIGTERM", False), ("3", "SIGINT", True)])
+def test_an_interrupted_run_shows_what_is_done_and_how_to_go_on(
+    started: Shell, jobs: str, name: str, ignored: bool
+) -> None:
+    """Also where it was started with SIGINT ignored, as what shells start in the background is."""
     given = ("run", "--problem", faulty(does="nothing"), "--problem", faulty(does="sleep"), "--route", "fd-central")
-    process = started.start(*given, "--no-timing", "--jobs", jobs)
+    with sigint_ignored() if ignored else nullcontext():
+        process = started.start(*given, "--no-timing", "--jobs", jobs)
     started.asleep()
     eventually(lambda: bool(Store(started.folder / "results" / "routes.sqlite").latest()))
     process.send_signal(signal.Signals[name])

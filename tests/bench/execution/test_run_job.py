@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import psutil
 import pytest
-from commands import Shell, ended, faulty, sigint_ignored
 
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.cases.study import Kept, Note
@@ -75,18 +74,26 @@ ENDS: dict[str, Ended] = {
 }
 
 
+def said(name: str, messages: list[Message]) -> Ended:
+    """The end of a job, after the same messages wherever it was done."""
+    *first, last = messages
+    assert first == [Kept("table", {"x": 1}), Note("half of it")]
+    assert isinstance(last, Ended)
+    assert (last.status, last.reason, last.killed) == (ENDS[name].status, ENDS[name].reason, False)
+    assert bool(last.traceback) == (name != "works")
+    return last
+
+
 @pytest.mark.parametrize("name", ENDS)
-def test_a_job_says_the_same_here_and_in_a_process_of_its_own(name: str) -> None:
+def test_a_job_ends_with_a_status_and_a_reason(name: str) -> None:
     taken: list[Message] = []
     end = here(Work(name), taken.append)
-    confined = list(stream(Work(name), Limits(), echo=False))
-    assert taken[:-1] == confined[:-1] == [Kept("table", {"x": 1}), Note("half of it")]
-    for last in (taken[-1], confined[-1]):
-        assert isinstance(last, Ended)
-        assert (last.status, last.reason, last.killed) == (ENDS[name].status, ENDS[name].reason, False)
-        assert bool(last.traceback) == (name != "works")
-    assert end is taken[-1]
-    assert "garbage" in confined[-1].stderr
+    assert end is said(name, taken)
+
+
+@pytest.mark.parametrize("name", ["works", "diverges", "foreign", "quits", "exhausted"])
+def test_a_job_says_the_same_in_a_process_of_its_own(name: str) -> None:
+    assert "garbage" in said(name, list(stream(Work(name), Limits(), echo=False))).stderr
 
 
 def test_an_end_is_a_line_with_its_exit_code() -> None:
@@ -257,25 +264,6 @@ def test_stdout_is_for_who_takes_the_messages(capfd: pytest.CaptureFixture[str])
         print("result")
     captured = capfd.readouterr()
     assert (captured.out, captured.err) == ("result\n" * 3, "garbage\n")
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        ("run", "--no-timing", "--problem", faulty(does="sleep"), "--route", "fd-central"),
-        ("run", "--no-timing", "--jobs", "2", "--problem", faulty(does="sleep"), "--route", "fd-central"),
-    ],
-)
-def test_a_command_started_with_sigint_ignored_is_interrupted_all_the_same(
-    started: Shell, given: tuple[str, ...]
-) -> None:
-    with sigint_ignored():
-        process = started.start(*given)
-    started.asleep()
-    process.send_signal(signal.SIGINT)
-    ran = ended(process)
-    assert (ran.code, "routes: interrupted" in ran.err) == (130, True), ran.err
-    started.nothing_is_left()
 
 
 def test_a_closed_stream_leaves_no_process() -> None:
