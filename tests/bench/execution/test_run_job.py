@@ -7,59 +7,23 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import psutil
 import pytest
+from example_jobs import Endless, Work
 
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.cases.study import Kept, Note
 from gradient_routes.bench.execution.isolation import process as watching
 from gradient_routes.bench.execution.isolation import run
-from gradient_routes.bench.execution.isolation.channel import Call, Channel
+from gradient_routes.bench.execution.isolation.channel import Call
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
 from gradient_routes.bench.execution.isolation.run import here, stream
 from gradient_routes.bench.execution.isolation.signals import interruptible
-from gradient_routes.problems.errors import DomainError, InputError, NotConverged, SingularMatrix
+from gradient_routes.problems.errors import InputError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes with limits")
-
-ERRORS: dict[str, Exception] = {
-    "refused": InputError("n = 3 is odd - choose an even n"),
-    "outside": DomainError("E_1 = -1 - choose E > 0"),
-    "diverges": NotConverged("Newton stops at 1e-3 - loosen --rtol", (1.0, 1e-3)),
-    "singular": SingularMatrix("R_u is singular - fix more"),
-    "foreign": ZeroDivisionError("division by zero"),
-    "exhausted": MemoryError("1 TB"),
-    "XLA": RuntimeError("RESOURCE_EXHAUSTED: 1 TB"),
-}
-
-
-@dataclass(frozen=True)
-class Work:
-    """Says a row, then does what it is named for."""
-
-    name: str
-
-    def __call__(self, channel: Channel) -> None:
-        print("garbage")
-        channel.say(Kept("table", {"x": 1}))
-        channel.say(Note("half of it"))
-        if self.name in ERRORS:
-            raise ERRORS[self.name]
-        if self.name == "crashes":
-            os._exit(3)
-        if self.name == "takes":
-            _ = b"x" * 10**10
-        if self.name == "grows":
-            held = []
-            while True:
-                held.append(b"x" * 10**6)
-                time.sleep(1e-4)
-        if self.name == "quits":
-            sys.exit(4)
-
 
 ENDS: dict[str, Ended] = {
     "works": Ended(Status.OK),
@@ -123,29 +87,6 @@ def test_the_value_of_a_function() -> None:
     first, last = stream(Call(divmod, (7, 2)), Limits())
     assert first == Returned((3, 1))
     assert last == Ended(Status.OK)
-
-
-@dataclass(frozen=True)
-class Endless:
-    """Hands over what it has when it is told to end, unless it is deaf."""
-
-    name: str = "endless"
-    deaf: bool = False
-
-    def __call__(self, channel: Channel) -> None:
-        if self.deaf:
-            signal.pthread_sigmask(signal.SIG_BLOCK, run_stops())
-        try:
-            channel.say(Note("begins"))
-            while True:
-                time.sleep(0.01)
-        except KeyboardInterrupt:
-            channel.say(Kept("table", {"x": 10**6 * "x"}))
-            raise
-
-
-def run_stops() -> set[signal.Signals]:
-    return {signal.SIGINT, signal.SIGTERM, signal.SIGALRM}
 
 
 class Late:
