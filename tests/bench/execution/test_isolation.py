@@ -213,17 +213,17 @@ def test_libraries_use_as_many_threads_as_they_may(started: Shell, cli) -> None:
 
 
 def test_larger_sizes_are_not_tried_after_a_limit_and_are_after_a_bug(cli) -> None:
-    sizes = faulty(n="1|2|3|4", taken=400)
+    sizes = faulty(n="1|2|3", taken=300)
     bugs = faulty(n="2|3", does="raise")
     command = ("run", "--no-timing", "--problem", sizes, "--problem", bugs, "--route", "fd-central")
-    ran = cli(*command, "--memory", "700MB", "--json", "--isolate")
+    ran = cli(*command, "--memory", "600MB", "--json", "--isolate")
     rows = [(row["problem_options"]["does"], row["n_param"], row["status"]) for row in ran.rows]
     assert rows == [
-        *(("nothing", 1, "ok"), ("nothing", 2, "out-of-memory"), ("nothing", 3, "pruned"), ("nothing", 4, "pruned")),
+        *(("nothing", 1, "ok"), ("nothing", 2, "out-of-memory"), ("nothing", 3, "pruned")),
         *(("raise", 2, "failed"), ("raise", 3, "failed")),
     ]
     assert ran.rows[2]["reason"] == (
-        "fd-central: out-of-memory at n_u = 0, n_p = 2 already - give more than --memory 668 MiB"
+        "fd-central: out-of-memory at n_u = 0, n_p = 2 already - give more than --memory 572 MiB"
     )
 
 
