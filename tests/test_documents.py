@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 DOCUMENTS = [str(p.relative_to(ROOT)) for p in PAGES if not {"reference", "_build"} & set(p.parts)]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# (\w+\.py)\n")  # the first line of a Python block that is a file of the reader's
+ECHO = 'echo "exit code $?"'
+LOOP = re.compile(r"for (\w+) in ([^;]+); do ([^;]+); done")
 QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 NUMBER = re.compile(r"(?<![\w.=\[-])<?[-+]?\d[\d.]*(e[-+]?\d+)?( (B|KiB|MiB|GiB|us|ms|s|min|h|d|y)\b)?")
 
@@ -44,15 +47,47 @@ def reader(document: str, folder: Path) -> Path:
     return folder
 
 
-def typed(cli, folder: Path, command: str) -> Ran:
-    """A command in this process, which has JAX imported and shares what is compiled; in a shell's where that has a
-    word in it, and where other processes run the cases.
+def typed(cli, folder: Path, line: str) -> Ran:
+    """A line of commands, one after the other."""
+    code, out, err = 0, "", ""
+    for command in LOOP.sub(repeated, line).split("; "):
+        if command == ECHO:
+            code, out = 0, f"{out}exit code {code}\n"
+        else:
+            ran = alone(cli, folder, command)
+            code, out, err = ran.code, out + ran.out, err + ran.err
+    return Ran(code, out, err)
+
+
+def repeated(loop: re.Match[str]) -> str:
+    name, words, command = loop.groups()
+    return "; ".join(command.replace(f"${name}", word) for word in words.split())
+
+
+def alone(cli, folder: Path, command: str) -> Ran:
+    """A command in this process, which has JAX imported and shares what is compiled: as shown, but timed as briefly
+    as may be, in processes of its own where it ends one. In a shell's where that has a word in it, and where Dask runs
+    the cases.
     """
-    special = set("[]{}()|&;<>*?$`~!") & set(QUOTED.sub("", command))
-    if special or "--executor" in command or not command.startswith("routes "):
+    head, _, reader = command.partition(" | ")
+    head, _, file = head.partition(" >")
+    asked = head.removesuffix(" 2>&1")
+    special = set("[]{}()|&;<>*?$`~!") & set(QUOTED.sub("", asked))
+    if special or "--executor" in asked or not asked.startswith("routes "):
         done = shell(command, folder)
         return Ran(done.returncode, done.stdout, done.stderr)
-    return cli(*shlex.split(command)[1:])
+    brief = ["--min-time", "0"] if asked.startswith("routes run ") and "--min-time" not in asked else []
+    apart = ["--isolate"] if "unruly" in asked else []
+    ran = cli(*shlex.split(asked)[1:], *brief, *apart)
+    if asked != head:
+        ran = Ran(ran.code, ran.out + ran.err, "")
+    if file:
+        (folder / file).write_text(ran.out)
+        ran = Ran(ran.code, "", ran.err)
+    if reader:
+        done = subprocess.run(reader, shell=True, cwd=folder, input=ran.out, capture_output=True, text=True)
+        ran = Ran(done.returncode, done.stdout, ran.err + done.stderr)
+    return ran
 
 
 def consoles() -> list[tuple[str, str]]:
