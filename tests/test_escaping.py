@@ -6,6 +6,7 @@ import ast
 import json
 import os
 import re
+import shutil
 import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -15,10 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from commands import ROOT, Ran, with_routes
 
 from gradient_routes.bench import sanitize
 from gradient_routes.bench.cases.column import Column
+from gradient_routes.bench.cli import main
 from gradient_routes.bench.render.figure import Axis, Figure, Guide, Table
 from gradient_routes.bench.render.html import report
 from gradient_routes.bench.render.sections import sections
@@ -67,17 +70,31 @@ def own(model, p):
     return (model.value(p), 2.0 * p)
 """
 
+FILE = f"m{CONTROLS[-2:]}<b id=mark>&.py"
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a store of cases that are ok, fail and are refused, and of a check, with the mark wherever it may
+    stand.
+    """
+    folder = tmp_path_factory.mktemp("filled")
+    (folder / FILE).write_text(USER)
+    routes = ("--route", f"{FILE}:own", "--no-isolate")
+    run = ("run", "--no-timing", "--route", "fd-central", *routes, "--problem")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for does in ("well", "raise"):
+            CliRunner().invoke(main, [*run, f"{FILE}:Mine[does={does},data={CONTROLS[-2:]}<b id=mark>]"])
+        CliRunner().invoke(main, ["check", "--problem", f"{FILE}:Mine", *routes])
+    assert (folder / "results" / "routes.sqlite").exists()
+    return folder
+
 
 @pytest.fixture
-def store(tmp_path: Path, cli) -> Path:
-    """A store of cases that are ok, fail and are refused, and of a check, with the mark wherever it may stand."""
-    (tmp_path / f"m{CONTROLS[-2:]}<b id=mark>&.py").write_text(USER)
-    (file,) = (path.name for path in tmp_path.glob("*.py"))
-    for does in ("well", "raise"):
-        problem = f"{file}:Mine[does={does},data={CONTROLS[-2:]}<b id=mark>]"
-        cli("run", "--problem", problem, "--route", "fd-central", "--route", f"{file}:own", "--no-timing")
-    cli("check", "--problem", f"{file}:Mine", "--route", f"{file}:own")
-    assert (tmp_path / "results" / "routes.sqlite").exists()
+def store(filled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path / "results" / "routes.sqlite"
 
 
@@ -93,7 +110,6 @@ def clean(ran: Ran) -> str:
 
 
 RUN = ("run", "--no-timing", "--no-store", "--route", "fd-central", "--problem")
-FILE = f"m{CONTROLS[-2:]}<b id=mark>&.py"
 SHOWN = {
     "table and gradient": (*RUN, f"{FILE}:Mine", "--gradient"),
     "rows": (*RUN, f"{FILE}:Mine", "--json"),
@@ -136,9 +152,9 @@ def test_what_a_store_holds_is_printed_without(verb: str, store: Path, cli) -> N
         assert "mark" in clean(cli(verb, *arguments, *form)) or verb == "baseline"
 
 
-def test_the_last_words_of_a_process_are_printed_without(started, tmp_path: Path) -> None:
+def test_the_last_words_of_a_process_are_printed_without(cli, tmp_path: Path) -> None:
     (tmp_path / "m.py").write_text(USER)
-    done = started.run("run", "--problem", "m.py:Mine[does=crash]", "--route", "fd-central", "--no-timing")
+    done = cli("run", "--problem", "m.py:Mine[does=crash]", "--route", "fd-central", "--no-timing", "--isolate")
     assert "| said <b id=mark>" in clean(done)
     assert done.code == 1
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-PROGRAM = [sys.executable, str(Path(__file__).parent / "executable_solver.py")]
+PROGRAM = [sys.executable, "-S", str(Path(__file__).parent / "executable_solver.py")]
 
 
 class External:
