@@ -108,6 +108,6 @@ def test_bad_options_are_refused(arguments: list[str], said: str, monkeypatch, c
 
 
 def test_a_name_that_no_box_has_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr(sys, "argv", ["confusion", "--boxes", "--only", "no-such-box"])
+    monkeypatch.setattr(sys, "argv", ["confusion", "--boxes", "--only", "no-such-box", "--seeds", "1", "--jobs", "1"])
     with pytest.raises(SystemExit, match="no box contains 'no-such-box'"):
         confusion.main()
