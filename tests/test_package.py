@@ -128,7 +128,9 @@ def test_the_tests_run_from_an_unpacked_sdist(built: Built, tmp_path: Path) -> N
 
 def test_it_runs_beside_routes_and_files_with_the_names_of_its_floors(installed: Installed) -> None:
     for routes, options in (("all", ["--no-isolate"]), ("adjoint", [])):  # in this process, and in one of its own
-        done = installed.run("routes", "run", "--problem", "bar", "--route", routes, "--no-store", "--json", *options)
+        done = installed.run(
+            "routes", "run", "--problem", "bar", "--route", routes, "--no-store", "--no-timing", "--json", *options
+        )
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.count('"status": "ok"') == (7 if routes == "all" else 1)
 
