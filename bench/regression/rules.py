@@ -59,6 +59,8 @@ def work(base: Case, new: Case) -> Finding:
 
 def counted(before: Mapping[str, int], now: Mapping[str, int]) -> tuple[Judgement, str]:
     """Compare counts by kind; a kind that is absent was counted 0 times."""
+    if before == now:
+        return "same", ""
     pairs = {kind: (before.get(kind, 0), now.get(kind, 0)) for kind in KINDS}
     changed = {kind: (b, n) for kind, (b, n) in pairs.items() if b != n}
     more = any(b < n for b, n in changed.values())
@@ -75,6 +77,8 @@ def gradient_error(base: Case, new: Case) -> Finding:
     before, now = (_finite(case.row["gradient_error"]) for case in (base, new))
     if before is None or now is None:
         return _absent("gradient_error", base, new, before, now)
+    if before == now:
+        return Finding(new.row, "gradient_error", before, now, "same")
     decades = log10(max(now, ROUNDING)) - log10(max(before, ROUNDING))
     judgement: Judgement = "worse" if decades >= DECADE else "better" if decades <= -DECADE else "same"
     judges = [case.row["reference"] for case in (base, new)]
