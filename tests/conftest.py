@@ -116,12 +116,11 @@ def piped_width(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
-@pytest.fixture(autouse=True)
-def garbage_of_this_test_only() -> Iterator[None]:
+@pytest.fixture(scope="module", autouse=True)
+def few_objects_to_collect() -> None:
     """Measurements collect garbage first: through all that JAX compiled for earlier tests that would take seconds."""
+    gc.collect()
     gc.freeze()
-    yield
-    gc.unfreeze()
 
 
 @pytest.fixture
