@@ -18,7 +18,7 @@ from gradient_routes.problems.contact import GAP, K_C, STOP_WIDTH, Stop, StopNam
 from gradient_routes.problems.data.observation import Candidates, Observation, selection
 from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
 from gradient_routes.problems.data.sensors import Nodes, Sensors, parse_nodes, read_sensors
-from gradient_routes.problems.errors import InputError, check_applies
+from gradient_routes.problems.errors import InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.tridiagonal import (
     BorderedTridiagonal,
     ElementForces,
@@ -290,6 +290,20 @@ class Bar(Problem):
             return None
         E = true_modulus(self.x)
         return np.log(E) if self.log else E
+
+    def case(self) -> dict[str, Any]:
+        if self.stop is not None or self.alpha:
+            raise NotOffered("bar: a stop or alpha > 0 is not described to other codes - leave it out")
+        return {
+            "kind": "bar",
+            "n": self.n,
+            "length": L,
+            "area": A,
+            "load": F,
+            "sensors": self.sensors.nodes,
+            "data": self.sensors.d,
+            "parametrization": "log" if self.log else "raw",
+        }
 
     def condition(self, p: Array) -> float:
         """Condition number for equal springs (eigenvalues 4 k sin^2((2 j - 1) pi / (4 N + 2))) times the contrast of E.

@@ -15,7 +15,7 @@ from gradient_routes.problems.data import probes
 from gradient_routes.problems.data.displacement_data import DisplacementData
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import PHI_WIDTH, Phi, Prior
-from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.errors import InputError, NotOffered
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, check_clamp
 from gradient_routes.problems.fem.elements import ElementName
 from gradient_routes.problems.fem.mesh import box_mesh, read_mesh
@@ -230,6 +230,37 @@ class Block(Problem):
         if unknown != "modulus":
             return finer, p
         return finer, prolongate(p, self.mesh.geometry.centres, finer.mesh.geometry.centres)
+
+    def case(self) -> dict[str, Any]:
+        """With one dead load on moduli, read at nodes."""
+        solid, probes, options = self.solid, self.data.probes, self._options
+        undescribed = {
+            "load": solid.load != "traction",
+            "cases": len(solid.directions) > 1,
+            "unknown": solid.design.modulus_of_cell is None,
+            "markers": probes.nodes.shape[1] > 1 or not probes.measured.all(),
+            "alpha": self.alpha > 0.0,
+        }
+        for name in (name for name, holds in undescribed.items() if holds):
+            raise NotOffered(f"block: {name}={options[name]} is not described to other codes - leave it out")
+        geometry = self.mesh.geometry
+        cell_type, cells = geometry.for_meshio()
+        forces = np.zeros_like(geometry.X)
+        np.add.at(forces, solid.loaded.nodes, solid.dead_forces(solid.base, 0, np))
+        return {
+            "kind": "hyperelastic",
+            "points": geometry.X,
+            "cell_type": cell_type,
+            "cells": cells,
+            "clamped": solid.bc.clamped,
+            "forces": forces,
+            "sensors": probes.nodes[:, 0],
+            "data": self.data.require_data()[0],
+            "law": solid.law.name,
+            "nu": options["nu"],
+            "modulus": solid.design.modulus_of_cell,
+            "parametrization": "log" if self.log else "raw",
+        }
 
     # --- synthetic data
 

@@ -51,6 +51,7 @@ class Offers(enum.Flag):
     CONTINUOUS_ADJOINT = 512
     FIELDS = 1024
     INCONSISTENT_ADJOINT = 2048
+    CASE = 4096
 
 
 OPTIONAL = (
@@ -61,6 +62,7 @@ OPTIONAL = (
     Offers.CONTINUOUS_ADJOINT,
     Offers.FIELDS,
     Offers.INCONSISTENT_ADJOINT,
+    Offers.CASE,
 )
 OFFERED_AS = {
     Offers.VALUE: "J(p) as a number",
@@ -68,6 +70,7 @@ OFFERED_AS = {
     Offers.LINEARIZE: "the partial derivatives R_p, J_u, J_p",
     Offers.TRACE: "R and J written in jax.numpy",
     Offers.COMPLEX: "R and J for complex arrays",
+    Offers.CASE: "a description for other codes",
 }
 
 
@@ -364,6 +367,17 @@ class Problem:
         As those of the continuous adjoint they equal R_u^T, R_p and J_u only as h goes to 0.
         """
         return None
+
+    def case(self) -> dict[str, Any]:
+        """This problem told to another code: numbers, texts and arrays, by names. Raises NotOffered for what cannot be.
+
+        `kind` says which of these it is:
+        bar           n, length [m], area [m^2], load [N], sensors (m,) nodes counted from 1, data (m,) [m]
+        hyperelastic  points (n, 3) [m], cell_type and cells (n_e, k) in VTK's order, clamped nodes, forces (n, 3) [N]
+                      dead nodal forces, sensors (m,) nodes, data (m, 3) [m], law, nu, modulus (n_e,) index in p
+        All: parametrization, log or raw: p is log E or E [Pa]; J = 1/2 |S u - d|^2. Nodes count from 0 where not said.
+        """
+        raise NotOffered(f"{self.name}: is not described to other codes")
 
     def condition(self, p: Array) -> float | None:
         """An estimate of the condition number of R_u, used only to predict numbers of iterations."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.problem import (
     Array,
     Discretization,
@@ -181,6 +182,9 @@ class Subspace(Wrapped):
     def refined(self, p: Array) -> None:
         """A finer mesh has other parameters than V knows."""
         return
+
+    def case(self) -> dict[str, Any]:
+        raise NotOffered(f"{self.name}: a part of its parameters is not described to other codes")
 
     def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> None:
         """A part of a gradient is no field."""

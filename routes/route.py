@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -25,6 +25,7 @@ class Result(NamedTuple):
     lam       adjoint state (n_u,), R_u^T lam = -J_u, where the route has one
     tape      bytes held between the forward and the backward sweep of AD
     du_dp     (n_u, k), columns of du/dp that were asked for
+    peer      of another code's gradient: its name and versions, and the seconds and bytes that it measured itself
     """
 
     J: float | None
@@ -34,6 +35,7 @@ class Result(NamedTuple):
     lam: Array | None = None
     tape: int | None = None
     du_dp: Array | None = None
+    peer: Mapping[str, Any] | None = None
 
 
 Gradient = Callable[[Array], Result]

@@ -18,7 +18,7 @@ FLOORS = ("problems", "routes", "bench")
 CONTRACT = {"problem", "errors", "matrices.tridiagonal", "matrices.sparse", "jax64"}
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (
-    *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "render"),
+    *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "environments", "render"),
     *("verification", "inversion", "regression", "studies", "commands", "api", "cli", "start"),
 )
 # the only modules that import JAX when they are imported; nothing imports those before it needs them

@@ -142,6 +142,8 @@ ORDER = (
     "unrolled-ad",
     "implicit-ad",
     "faulty-adjoint",
+    "adapter",
+    "jax",
     "run",
     "scaling",
     "vcurve",

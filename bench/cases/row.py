@@ -56,6 +56,7 @@ COLUMNS = (
     Column("ratio_floor", "REAL", "1", "forward solves in the counted work, a bound below forward_ratio"),
     Column("peak_bytes", "INTEGER", "byte", "peak memory of one call above what was held before it"),
     Column("memory_method", "TEXT", "", "how peak_bytes was measured"),
+    Column("peer", "TEXT", "s, byte", "what another code says of itself: name, versions, its phases", json=True),
     Column("factor_bytes", "INTEGER", "byte", "what the factors behind the forward solve hold"),
     Column("tape_bytes", "INTEGER", "byte", "arrays AD holds between its forward and its backward sweep"),
     Column("tape_bytes_per_iteration", "REAL", "byte", "tape_bytes / iterations of unrolled routes"),

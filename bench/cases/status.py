@@ -28,6 +28,7 @@ class Status(StrEnum):
     TIMEOUT = "timeout", "killed at its limit of wall time", "raise the limit, or ask for less"
     OUT_OF_MEMORY = "out-of-memory", "it needs more memory than it may use", "raise --memory, or ask for less"
     NOT_CONVERGED = "not-converged", "a solver did not reach its tolerance"
+    OTHER_FUNCTIONAL = "other-functional", "another code's J is not ours: its gradient is of something else"
     NON_FINITE = "non-finite", "a result is NaN or infinite"
     FAILED = "failed", "it raised an exception"
     CRASHED = "crashed", "its process ended without a result", "see its output above"

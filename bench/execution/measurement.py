@@ -26,7 +26,7 @@ from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Judge, KnownJudges, norm2
-from gradient_routes.bench.execution.solved import adjoint, rounding, unsolved
+from gradient_routes.bench.execution.solved import adjoint, other_functional, rounding, unsolved
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
 from gradient_routes.problems.errors import DomainError, InputError, RoutesError
@@ -155,27 +155,30 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
     record.add({"first_s": first_s})
     record.add(_checked(context, route, result, record))
     begin("judgement")
-    reason = unsolved(context, route, result)
+    reason = other_functional(context, route, result)
+    status = Status.NOT_CONVERGED if reason is None else Status.OTHER_FUNCTIONAL
+    reason = reason or unsolved(context, route, result)
     if reason is None and (why := rounding(context, result)) is not None:
         record.note(f"{route.name}: {why}")
     adjoint_residual, why = adjoint(context, result)
     record.add({"adjoint_residual": adjoint_residual})
     if why is not None:
         record.note(f"{route.name}: {why}")
-    _judge(context, route, record, np.asarray(result.gradient))
+    if status is not Status.OTHER_FUNCTIONAL:
+        _judge(context, route, record, np.asarray(result.gradient))
     _estimate(context, route, record, result)
     begin("the counting of its work")
     again_s = _count(context, route, options, lambda: gradient(p), model, record)
     rounds = Rounds(lambda: gradient(p), context.forward(), min(first_s, again_s), context.settings.min_time)
     begin("timing")
-    return Measurement(context, route, record, result, rounds if context.settings.timed else None, reason)
+    return Measurement(context, route, record, result, rounds if context.settings.timed else None, status, reason)
 
 
 @dataclass(frozen=True)
 class Measurement:
     """A case that has been prepared, called and judged; its timing comes in turns, where it is timed.
 
-    unsolved  why its gradient belongs to no solved state, None where it does
+    status, reason  how it ends where there is a reason for that; it is ok where there is none
     """
 
     context: CaseContext
@@ -183,7 +186,8 @@ class Measurement:
     record: Record
     result: Result
     rounds: Rounds | None
-    unsolved: str | None
+    status: Status
+    reason: str | None
 
     @property
     def long(self) -> bool:
@@ -204,8 +208,8 @@ class Measurement:
         context = self.context
         with undisturbed():
             return self.record.ended(
-                Status.OK if self.unsolved is None else Status.NOT_CONVERGED,
-                self.unsolved,
+                Status.OK if self.reason is None else self.status,
+                self.reason,
                 samples=samples,
                 view=context.view(self.route, self.result),
                 fields=context.fields(self.result),
@@ -276,6 +280,7 @@ def _checked(context: CaseContext, route: Route, result: Result, record: Record)
         "gradient_norm": norm2(g),
         "residual": None if result.residual is None else float(result.residual),
         "tape_bytes": None if result.tape is None else int(result.tape),
+        "peer": None if result.peer is None else dict(result.peer),
     }
 
 
@@ -314,6 +319,9 @@ def _count(
     """Count the work of one call and read its memory, apart from timing. Returns the seconds that it took."""
     before = model.tally.work
     again_s, (peak, method) = seconds_of(lambda: peak_of(gradient))
+    peer = record.known["peer"]
+    if peer is not None:
+        peak, method = peer.get("peak_bytes"), f"by {peer['name']} itself"
     work = model.tally.work - before
     declared = route.cost(len(context.p), replace(context.prices.declared, counted=work), **options)
     record.add({"peak_bytes": peak, "memory_method": method})

@@ -113,10 +113,10 @@ class Judges:
 
     def _size(self, gradient: Array, natural: Array) -> float:
         """Of the terms: the gradient's, or where that is next to nothing what J changes by where p naturally does."""
-        return max(norm2(gradient), self._terms * norm2(natural))
+        return max(norm2(gradient), self.terms * norm2(natural))
 
     @cached_property
-    def _terms(self) -> float:
+    def terms(self) -> float:
         """What J is made of: near its minimum far less of that is left than at the state solves start from."""
         problem = self.model.problem
         before = problem.objective(problem.initial(self.p), self.p) if Offers.SOLVE in problem.offers else 0.0
@@ -128,7 +128,7 @@ class Judges:
 
     def _another_state(self, J: float | None) -> bool:
         """Whether a judge's J is not the J of real solves: where R(u, p) = 0 has several solutions it may be."""
-        return J is not None and abs(J - self._J) > SAME * self._terms
+        return J is not None and abs(J - self._J) > SAME * self.terms
 
     def _slopes(self, route: Route, few: Subspace) -> Array:
         solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol))

@@ -14,6 +14,7 @@ from gradient_routes.routes.newton import ROUNDING, State, norm
 from gradient_routes.routes.route import Result, Route
 
 APART = 10.0  # Newton corrections: two states further apart are not approximations of one
+SAME_J = 1e-3  # of the terms of J: more than the default tolerances of other codes leave in it
 SAME = 1e-8  # of |u|: nearer than that they are, whatever the corrections say
 
 
@@ -34,6 +35,16 @@ def unsolved(context: CaseContext, route: Route, result: Result) -> str | None:
             " - iterate further, or take implicit-ad or adjoint"
         )
     return None if np.array_equal(u, state.u) else _elsewhere(model, route, u, state)
+
+
+def other_functional(context: CaseContext, route: Route, result: Result) -> str | None:
+    """That the J of another code is not ours, with both; None where it is, up to what a loose solve leaves in it."""
+    if result.peer is None or result.J is None:
+        return None
+    ours, terms = context.objective(), context.judges.terms
+    if abs(result.J - ours) <= SAME_J * terms:
+        return None
+    return f"{route.name}: its J is {result.J:.9g}, ours {ours:.9g} - compare the signs of its loads first"
 
 
 def rounding(context: CaseContext, result: Result) -> str | None:

@@ -1,0 +1,108 @@
+"""The other side of the adapter protocol, version 1, for adapters in Python. Import it before the framework.
+
+It stands alone: Python 3.9, NumPy, nothing else of this project. From its import on what is printed goes to stderr.
+
+    class Torch:
+        def load(self, case): ...            # raises Unsupported
+        def value(self, p): ...              # J
+        def gradient(self, p, rtol, adjoint_rtol, **options): ...   # {"J": ..., "gradient": ..., ...}
+
+    serve(Torch(), name="torch-fem", versions=["torch", "torch-fem"])
+"""
+
+import base64
+import json
+import os
+import sys
+import traceback
+from importlib.metadata import version
+
+_OUT = os.fdopen(os.dup(1), "wb")
+os.dup2(2, 1)  # frameworks print while they are imported, and from C
+_IN = sys.stdin.buffer
+
+import numpy as np  # noqa: E402
+
+PROTOCOL, FRAMED = 1, 65_536
+
+
+class Refusal(Exception):
+    """An error with a kind of the protocol."""
+
+    kind = "bug"
+
+
+class NotConverged(Refusal):
+    kind = "not-converged"
+
+
+class Singular(Refusal):
+    kind = "singular"
+
+
+class Domain(Refusal):
+    kind = "domain"
+
+
+class Unsupported(Refusal):
+    kind = "unsupported"
+
+
+def serve(adapter, name, versions=(), **about):
+    """Answers until `bye` or the end of input. `about`: more of what `describe` says."""
+    while True:
+        line = _IN.readline()
+        if not line:
+            return
+        asked = _unpacked(json.loads(line))
+        method, arguments = asked.pop("method"), {k: v for k, v in asked.items() if k != "id"}
+        try:
+            if method == "describe":
+                known = {each: version(each) for each in versions}
+                said = {"protocol": PROTOCOL, "name": name, "versions": known, **about}
+            elif method == "bye":
+                said = {}
+            else:
+                said = getattr(adapter, method)(**arguments)
+            _send({"id": asked["id"], "result": said if isinstance(said, dict) else {"J": said}})
+        except Exception as error:
+            kind = "memory" if isinstance(error, MemoryError) else getattr(error, "kind", "bug")
+            if kind == "bug":
+                traceback.print_exc()
+            _send({"id": asked["id"], "error": {"kind": kind, "message": f"{type(error).__name__}: {error}"}})
+        if method == "bye":
+            return
+
+
+def _send(message):
+    frames = []
+    _OUT.write(json.dumps(_packed(message, frames)).encode() + b"\n")
+    for frame in frames:
+        _OUT.write(frame)
+    _OUT.flush()
+
+
+def _packed(value, frames):
+    if isinstance(value, dict):
+        return {key: _packed(each, frames) for key, each in value.items()}
+    if isinstance(value, np.generic):
+        return value.item()
+    if not isinstance(value, np.ndarray):
+        return value
+    array = np.ascontiguousarray(value, "<f8")
+    if array.nbytes < FRAMED:
+        return {"float64": array.shape, "base64": base64.b64encode(array.tobytes()).decode()}
+    frames.append(array.tobytes())
+    return {"float64": array.shape, "frame": array.nbytes}
+
+
+def _unpacked(value):
+    if isinstance(value, list):
+        return [_unpacked(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    for name, dtype in (("float64", "<f8"), ("int64", "<i8")):
+        if name in value:
+            data = _IN.read(value["frame"]) if "frame" in value else base64.b64decode(value["base64"])
+            return np.frombuffer(data, dtype).reshape(value[name]).copy()
+    return {key: _unpacked(each) for key, each in value.items()}

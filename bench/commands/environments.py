@@ -1,0 +1,75 @@
+"""`routes environments`: what adapters run in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import click
+
+from gradient_routes.bench.command_options import debug_option
+from gradient_routes.bench.sanitize import echo
+
+CASES = {"bar": "bar", "hyperelastic": "block[n=2]"}  # by kind: a problem to hold a new environment against ours
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+@debug_option
+def environments(context: click.Context) -> None:
+    """List the environments that the adapters of other frameworks run in.
+
+    \b
+    routes environments                     which there are, what they weigh
+    routes environments create torch-fem    make one, and hold a gradient of it against ours
+    """
+    from gradient_routes.bench.environments.building import weight
+    from gradient_routes.bench.units import size
+    from gradient_routes.routes.foreign.manifest import manifest, shipped
+
+    if context.invoked_subcommand is not None:
+        return
+    for name, script in shipped().items():
+        found = manifest(script)
+        state = size(weight(found.folder)) if found.ready else f"missing: routes environments create {name}"
+        echo(f"{name:<16}{state:<16}  {found.summary}")
+
+
+@environments.command()
+@click.argument("names", nargs=-1, required=True, metavar="NAME...")
+@debug_option
+def create(names: tuple[str, ...]) -> None:
+    """Make the environments of the adapters NAME, by uv where it is installed, else by venv and pip.
+
+    Packages and versions are those of the adapter's inline metadata. A new environment is held against ours by one
+    gradient.
+    """
+    from gradient_routes.bench.cases.suggest import did_you_mean
+    from gradient_routes.bench.environments.building import create as make
+    from gradient_routes.bench.environments.building import weight
+    from gradient_routes.bench.units import size
+    from gradient_routes.problems.errors import InputError
+    from gradient_routes.routes.foreign.manifest import manifest, shipped
+
+    known = shipped()
+    for name in names:
+        if name not in known:
+            raise InputError(f"no adapter '{name}' - {did_you_mean(name, known)}")
+    for name in names:
+        found = manifest(known[name])
+        folder = make(found)
+        echo(f"{name}: {size(weight(folder))} in {folder}, {_compared(name, found.cases)}")
+
+
+def _compared(name: str, kinds: Mapping[str, object]) -> str:
+    """One gradient against ours, in words. Raises RoutesError where it is none."""
+    from gradient_routes.bench.cases import case
+    from gradient_routes.bench.cases.settings import Settings
+    from gradient_routes.bench.execution.sweep import run
+    from gradient_routes.problems.errors import RoutesError
+
+    problem = next(CASES[kind] for kind in CASES if kind in kinds)
+    (outcome,) = run(case.problems([problem]), case.routes([name]), Settings(timed=False))
+    row = outcome.row
+    if row["status"] != "ok":
+        raise RoutesError(f"{name}: its gradient on {problem} is {row['status']}: {row['reason']}")
+    return f"gradient on {problem} off ours by {row['gradient_error']:.1e}"

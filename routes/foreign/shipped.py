@@ -1,0 +1,12 @@
+"""The adapters of this package as routes, one a line."""
+
+from gradient_routes.routes.foreign.foreign import of_manifest
+from gradient_routes.routes.foreign.manifest import ADAPTERS, manifest
+from gradient_routes.routes.route import Route
+
+
+def _route(name: str) -> Route:
+    return of_manifest(manifest(ADAPTERS / f"{name}.py"))
+
+
+jax = _route("jax")
