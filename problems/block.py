@@ -238,7 +238,7 @@ class Block(Problem):
             "load": solid.load != "traction",
             "cases": len(solid.directions) > 1,
             "unknown": solid.design.modulus_of_cell is None,
-            "markers": probes.nodes.shape[1] > 1 or not probes.measured.all(),
+            "markers" if options["markers"] else "data": probes.nodes.shape[1] > 1 or not probes.measured.all(),
             "alpha": self.alpha > 0.0,
         }
         for name in (name for name, holds in undescribed.items() if holds):

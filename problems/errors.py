@@ -13,6 +13,14 @@ class InputError(RoutesError):
     """Invalid input: an option, a file or a name. Nothing was computed."""
 
 
+class Unsupported(InputError):
+    """Another code does not know a case, or an option."""
+
+
+class Crashed(RoutesError):
+    """The process of another code ended without a result."""
+
+
 class DomainError(RoutesError):
     """A parameter or a finite-difference step lies outside the domain of the parameter."""
 

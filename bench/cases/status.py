@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from gradient_routes.problems.errors import NotConverged, RoutesError
+from gradient_routes.problems.errors import Crashed, NotConverged, RoutesError
 from gradient_routes.problems.text import shortened
 
 FOREIGN = (Exception, SystemExit, GeneratorExit)  # what the code of a plug-in may raise
@@ -56,7 +56,8 @@ def status_of(failure: BaseException) -> Status:
         return Status.OUT_OF_MEMORY
     if isinstance(failure, NotConverged):
         return Status.NOT_CONVERGED
-    return Status.NON_FINITE if isinstance(failure, NonFinite) else Status.FAILED
+    typed = {NonFinite: Status.NON_FINITE, Crashed: Status.CRASHED}
+    return next((status for kind, status in typed.items() if isinstance(failure, kind)), Status.FAILED)
 
 
 def one_line(error: BaseException) -> str:

@@ -29,7 +29,7 @@ from gradient_routes.bench.execution.references import Judge, KnownJudges, norm2
 from gradient_routes.bench.execution.solved import adjoint, other_functional, rounding, unsolved
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
-from gradient_routes.problems.errors import DomainError, InputError, RoutesError
+from gradient_routes.problems.errors import DomainError, InputError, RoutesError, Unsupported
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
@@ -119,6 +119,8 @@ def measure(
         record.add({"n_state": context.problem.n_state, "note": "; ".join(context.problem.notes) or None})
         with undisturbed():
             return _measured(context, case, record, begin)
+    except Unsupported as unknown:
+        return record.ended(Status.SKIPPED, str(unknown), environment=environment())
     except FOREIGN as failure:
         return record.failed(failure, case.route.name, environment=environment())
 

@@ -12,11 +12,12 @@ import numpy as np
 from gradient_routes.problems.errors import InputError, NotOffered
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.foreign.manifest import Manifest
-from gradient_routes.routes.foreign.peer import AdapterError, Peer
+from gradient_routes.routes.foreign.peer import AdapterError, Peer, shown
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import ForwardWork, Gradient, Result, Route, Work, route
 
 PHASES = ("forward_s", "backward_s", "compile_s")  # wall time [s] that an adapter measures itself
+MOST = 1e300  # of a number: JSON has integers of any size
 
 
 def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
@@ -37,30 +38,44 @@ def gradients(command: Sequence[str], who: str, model: Model, options: Mapping[s
     return gradient
 
 
+def objective(answer: Mapping[str, Any], what: str) -> float:
+    """The J of an answer. Raises AdapterError where it is no number; NaN is one."""
+    J = answer.get("J")
+    if isinstance(J, bool) or not isinstance(J, int | float) or (isinstance(J, int) and abs(J) > MOST):
+        raise AdapterError(f"{what}: J = {shown(J)} - give a number")
+    return float(J)
+
+
 def _result(answer: Mapping[str, Any], peer: Peer, who: str) -> Result:
-    J, g = answer.get("J"), answer.get("gradient")
-    if not isinstance(J, int | float) or not isinstance(g, np.ndarray) or g.dtype != np.float64:
-        raise AdapterError(f"{who}: gradient(): J = {J}, gradient {type(g).__name__} - give a number and float64s")
+    what = f"{who}: gradient()"
+    J, g = objective(answer, what), answer.get("gradient")
+    if not isinstance(g, np.ndarray) or g.dtype != np.float64:
+        raise AdapterError(f"{what}: the gradient is {shown(g)} - give an array of float64")
     numbers = {name: answer.get(name) for name in ("residual", "tape_bytes", "peak_bytes", *PHASES)}
     for name, number in numbers.items():
-        if number is not None and (isinstance(number, bool) or not isinstance(number, int | float)):
-            raise AdapterError(f"{who}: gradient(): {name} = {number!r} - give a number, or leave it out")
-    told = {"name": peer.about.get("name", who), "versions": peer.about.get("versions", {})}
+        real = isinstance(number, int | float) and not isinstance(number, bool)
+        if number is not None and not (real and 0 <= number < MOST):
+            raise AdapterError(f"{what}: {name} = {shown(number)} - give a number >= 0, or leave it out")
+    told = {"name": peer.name or who, "versions": peer.versions}
     measured = {name: numbers[name] for name in (*PHASES, "peak_bytes") if numbers[name] is not None}
     tape = numbers["tape_bytes"]
-    return Result(
-        float(J), g, residual=numbers["residual"], tape=None if tape is None else int(tape), peer=told | measured
-    )
+    return Result(J, g, residual=numbers["residual"], tape=None if tape is None else int(tape), peer=told | measured)
+
+
+def undescribed(problem: Problem, **options: Any) -> str | None:
+    """What of a problem cannot be told to other codes, in a sentence; None where all can."""
+    try:
+        problem.case()
+    except NotOffered as what:
+        return str(what)
+    return None
 
 
 def of_manifest(each: Manifest) -> Route:
     """The route of an adapter that has a manifest; its options are those of the manifest."""
 
     def missing(problem: Problem, **options: Any) -> str | None:
-        try:
-            objection = each.unknown(problem.case())
-        except NotOffered as undescribed:
-            return str(undescribed)
+        objection = undescribed(problem) or each.unknown(problem.case())
         if objection is None and not each.ready:
             return f"{each.name} has no environment here - make it: routes environments create {each.name}"
         return objection
@@ -84,17 +99,34 @@ def of_manifest(each: Manifest) -> Route:
         ]
     )
     needs = Offers.VALUE | Offers.CASE
-    return Route(each.name, needs, function, cost, staged=True, missing=missing)
+    return Route(each.name, needs, function, cost, staged=True, missing=missing, sound=False)
 
 
-def _needs_command(*, command: str) -> None:
-    if not command:
+def _check(*, command: str) -> None:
+    _words(command)
+
+
+def _words(command: str) -> list[str]:
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise InputError(f"adapter: command={command}: {error} - close it") from None
+    if not words:
         raise InputError("adapter: no command - give one: --route 'adapter[command=./mine]'")
+    return words
 
 
-@route("adapter", needs=Offers.VALUE | Offers.CASE, cost=cost, staged=True, check=_needs_command)
+@route(
+    "adapter",
+    needs=Offers.VALUE | Offers.CASE,
+    cost=cost,
+    staged=True,
+    check=_check,
+    missing=undescribed,
+    sound=False,
+)
 def adapter(
     model: Model, p: Array, *, command: Annotated[str, "that speaks the adapter protocol, in any language"] = ""
 ) -> Gradient:
     """Any program that speaks the adapter protocol over stdio."""
-    return gradients(shlex.split(command), "adapter", model, {})
+    return gradients(_words(command), "adapter", model, {})

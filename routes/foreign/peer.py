@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import itertools
 import os
+import signal
 import subprocess
 import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from gradient_routes.problems.errors import DomainError, InputError, NotConverged, RoutesError, SingularMatrix
+import numpy as np
+
+from gradient_routes.problems.errors import (
+    Crashed,
+    DomainError,
+    NotConverged,
+    RoutesError,
+    SingularMatrix,
+    Unsupported,
+)
 from gradient_routes.problems.text import shortened
 from gradient_routes.routes.foreign.protocol import VERSION, Ended, NoMessage, receive, send
 
+NAME = 80  # characters of a name, a version, a wrong value
 GRACE_S = 5.0  # for an adapter to end by itself
 FORCED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")  # of our process, to which a peer is not bound
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NPROC")
@@ -33,7 +44,8 @@ def environment(threads: int | None = None) -> dict[str, str]:
 class Peer:
     """A started adapter that speaks the protocol. `who` is named in errors; its process ends with this object.
 
-    Raises AdapterError where it cannot be started, is of another version, or does not answer as the protocol has it.
+    Raises AdapterError where it cannot be started, is of another version, or does not answer as the protocol has it,
+    Crashed where it ends.
     """
 
     def __init__(self, command: Sequence[str], who: str, variables: Mapping[str, str] | None = None) -> None:
@@ -52,6 +64,17 @@ class Peer:
                 " - renew the adapter"
             )
 
+    @property
+    def name(self) -> str:
+        """As it calls itself; empty where it does not."""
+        return shortened(str(self.about.get("name", "")), NAME)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Of what it runs on."""
+        given = self.about.get("versions")
+        return {str(name): shortened(str(of), NAME) for name, of in given.items()} if isinstance(given, dict) else {}
+
     def ask(self, method: str, **arguments: Any) -> dict[str, Any]:
         """The result. Raises the error that the adapter answers with, AdapterError for no proper answer."""
         number = next(self._numbers)
@@ -59,7 +82,7 @@ class Peer:
             send(self._in, {"id": number, "method": method, **arguments})
             answer = receive(self._out)
         except (BrokenPipeError, Ended):
-            raise AdapterError(f"{self.who}: {self._last_words()} in {method}() - see its output") from None
+            raise Crashed(f"{self.who}: {self._last_words()} in {method}() - see its output") from None
         except NoMessage as odd:
             raise AdapterError(f"{self.who}: {method}(): {odd} - stdout is for messages alone") from None
         if "error" in answer:
@@ -88,7 +111,8 @@ class Peer:
             code = self._process.wait(GRACE_S)
         except subprocess.TimeoutExpired:
             return "has closed its output"
-        return f"was ended by signal {-code}" if code < 0 else f"ended with exit code {code}"
+        name = signal.Signals(-code).name if -code in {*signal.Signals} else -code
+        return f"was ended by signal {name}" if code < 0 else f"ended with exit code {code}"
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -103,6 +127,11 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
+def shown(value: Any) -> str:
+    """What an adapter gave in place of something else."""
+    return f"an array of {value.dtype}" if isinstance(value, np.ndarray) else shortened(repr(value), NAME)
+
+
 def _error(who: str, error: Any) -> Exception:
     kind = error.get("kind") if isinstance(error, dict) else None
     said = shortened(" ".join(str(error.get("message", "no message") if isinstance(error, dict) else error).split()))
@@ -114,6 +143,6 @@ def _error(who: str, error: Any) -> Exception:
     known: dict[Any, type[RoutesError]] = {
         "singular": SingularMatrix,
         "domain": DomainError,
-        "unsupported": InputError,
+        "unsupported": Unsupported,
     }
     return known.get(kind, AdapterError)(message)
