@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from commands import PATIENCE, ROOT
 
-FLOORS = ("bench", "problems", "routes")
+FLOORS = ("adapters", "bench", "problems", "routes")
 GENERATED = {"PKG-INFO", "setup.cfg"}
 BUILD = "import sys, setuptools.build_meta as b; to = sys.argv[1]; b.build_wheel(to); b.build_sdist(to)"
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")

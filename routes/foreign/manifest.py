@@ -114,6 +114,4 @@ def manifest(script: Path) -> Manifest:
 
 def shipped() -> dict[str, Path]:
     """The adapters of this package: name -> script."""
-    return {
-        path.stem: path for path in sorted(ADAPTERS.glob("*.py")) if path.stem not in ("__init__", "routes_adapter")
-    }
+    return {path.stem: path for path in sorted(ADAPTERS.glob("*.py"))}
