@@ -293,7 +293,8 @@ class Bar(Problem):
 
     def case(self) -> dict[str, Any]:
         if self.stop is not None or self.alpha:
-            raise NotOffered("bar: a stop or alpha > 0 is not described to other codes - leave it out")
+            what = f"alpha={self.alpha:g}" if self.stop is None else "a stop"
+            raise NotOffered(f"bar: {what} is not described to other codes - leave it out")
         return {
             "kind": "bar",
             "n": self.n,

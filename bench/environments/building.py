@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gradient_routes.bench.environments.interpreters import fitting
 from gradient_routes.problems.errors import RoutesError
+from gradient_routes.problems.text import shortened
 from gradient_routes.routes.foreign.manifest import Manifest
 
 
@@ -25,9 +26,9 @@ def create(manifest: Manifest) -> Path:
     python, folder = fitting(manifest.requires_python, manifest.name), manifest.folder
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    uv = shutil.which("uv")
+    uv, nothing = shutil.which("uv"), not (manifest.dependencies or manifest.without_dependencies)
     make = [uv, "venv", "--quiet", "--python", str(python)] if uv else [str(python), "-m", "venv"]
-    _run([*make, str(folder)], manifest.name)
+    _run([*make, *(["--without-pip"] if nothing and not uv else []), str(folder)], manifest.name)
     there = str(manifest.python)
     install = [uv, "pip", "install", "--quiet", "--python", there] if uv else [there, "-m", "pip", "install", "--quiet"]
     for needed, alone in ((manifest.dependencies, []), (manifest.without_dependencies, ["--no-deps"])):
@@ -43,7 +44,7 @@ def _run(command: Sequence[str], who: str) -> None:
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=variables)
     if done.returncode:
         said = (done.stderr.strip() or done.stdout.strip() or "no word").splitlines()[-1]
-        raise NotInstalled(f"{who}: {Path(command[0]).name} ended with exit code {done.returncode}: {said}")
+        raise NotInstalled(f"{who}: {Path(command[0]).name} ended with exit code {done.returncode}: {shortened(said)}")
 
 
 def weight(folder: Path) -> int:
