@@ -79,6 +79,7 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.large
 	$(BIN)/python -m benchmarks.loads
 	$(BIN)/python -m benchmarks.error_bars
+	$(BIN)/python -m benchmarks.adapter_overhead
 
 faults: $(READY) ## 300 kills, full disks and read-only stores at random points of sweeps: is anything lost? (half an hour)
 	$(BIN)/python -m benchmarks.faults

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from gradient_routes.bench.command_options import debug_option
 from gradient_routes.bench.sanitize import echo
+
+if TYPE_CHECKING:
+    from gradient_routes.routes.foreign.manifest import Manifest
 
 CASES = {"bar": "bar", "hyperelastic": "block[n=2]"}  # by kind: a problem to hold a new environment against ours
 
@@ -35,10 +40,10 @@ def environments(context: click.Context) -> None:
 
 
 @environments.command()
-@click.argument("names", nargs=-1, required=True, metavar="NAME...")
+@click.argument("names", nargs=-1, required=True, metavar="NAME|FILE.py...")
 @debug_option
 def create(names: tuple[str, ...]) -> None:
-    """Make the environments of the adapters NAME, by uv where it is installed, else by venv and pip.
+    """Make the environments of adapters, by uv where it is installed, else by venv and pip.
 
     Packages and versions are those of the adapter's inline metadata. A new environment is held against ours by one
     gradient.
@@ -51,25 +56,27 @@ def create(names: tuple[str, ...]) -> None:
     from gradient_routes.routes.foreign.manifest import manifest, shipped
 
     known = shipped()
-    for name in names:
-        if name not in known:
-            raise InputError(f"no adapter '{name}' - {did_you_mean(name, known)}")
-    for name in names:
-        found = manifest(known[name])
+    scripts = {name: Path(name).absolute() if name.endswith(".py") else known.get(name) for name in names}
+    for name in (name for name, script in scripts.items() if script is None):
+        raise InputError(f"no adapter '{name}' - {did_you_mean(name, known)}")
+    for found in [manifest(script) for script in scripts.values() if script is not None]:
         folder = make(found)
-        echo(f"{name}: {size(weight(folder))} in {folder}, {_compared(name, found.cases)}")
+        route = found.name if found.script in known.values() else f"adapter[command={shlex.quote(str(found.script))}]"
+        echo(f"{found.name}: {size(weight(folder))} in {folder}, {_compared(route, found)}")
 
 
-def _compared(name: str, kinds: Mapping[str, object]) -> str:
+def _compared(route: str, adapter: Manifest) -> str:
     """One gradient against ours, in words. Raises RoutesError where it is none."""
     from gradient_routes.bench.cases import case
     from gradient_routes.bench.cases.settings import Settings
     from gradient_routes.bench.execution.sweep import run
     from gradient_routes.problems.errors import RoutesError
 
-    problem = next(CASES[kind] for kind in CASES if kind in kinds)
-    (outcome,) = run(case.problems([problem]), case.routes([name]), Settings(timed=False))
+    problem = next((CASES[kind] for kind in CASES if kind in adapter.cases), None)
+    if problem is None:
+        return "not compared: it knows none of our problems"
+    (outcome,) = run(case.problems([problem]), case.routes([route]), Settings(timed=False))
     row = outcome.row
     if row["status"] != "ok":
-        raise RoutesError(f"{name}: its gradient on {problem} is {row['status']}: {row['reason']}")
+        raise RoutesError(f"{adapter.name}: its gradient on {problem} is {row['status']}: {row['reason']}")
     return f"gradient on {problem} off ours by {row['gradient_error']:.1e}"

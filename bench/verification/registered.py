@@ -43,7 +43,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
         return last[0].gradient
 
     def tighten(factor: float) -> Subject:
-        return subject(problem, route, _iterated(options, factor), p, _tighter(solver, factor))
+        return subject(problem, route, _iterated(options, factor), p, tighter(solver, factor))
 
     def refine() -> Subject | None:
         found = problem.refined(p)
@@ -79,7 +79,7 @@ def subject(problem: Problem, route: Route, options: Options, p: Array, solver: 
     return made
 
 
-def _tighter(solver: Solver, factor: float) -> Solver:
+def tighter(solver: Solver, factor: float) -> Solver:
     """Tolerances times the factor, and one Newton step more: near the solution a tolerance alone may change nothing."""
 
     def tight(rtol: float, least: float) -> float:

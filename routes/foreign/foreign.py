@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import inspect
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from gradient_routes.problems.errors import InputError, NotOffered
+from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.problem import Array, Offers, Problem
+from gradient_routes.routes.foreign.command import Command, command_of, words_of
 from gradient_routes.routes.foreign.manifest import Manifest
 from gradient_routes.routes.foreign.peer import AdapterError, Peer, shown
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import ForwardWork, Gradient, Result, Route, Work, route
 
 PHASES = ("forward_s", "backward_s", "compile_s")  # wall time [s] that an adapter measures itself
@@ -25,17 +26,34 @@ def cost(n_p: int, forward: ForwardWork, **options: Any) -> Work:
     return Work()
 
 
-def gradients(command: Sequence[str], who: str, model: Model, options: Mapping[str, Any]) -> Gradient:
+class Foreign:
+    """A started adapter that has loaded a problem's case. Raises what Peer does, and the adapter's own errors."""
+
+    def __init__(self, command: Command, who: str, problem: Problem) -> None:
+        self.who, self.options = who, command.options
+        self.peer = Peer(command.words, who)
+        self.peer.ask("load", case=problem.case())
+
+    @property
+    def tightens(self) -> bool:
+        """Whether its forward solve heeds rtol."""
+        return self.peer.about.get("tighten") is True
+
+    def value(self, p: Array, solver: Solver) -> float:
+        """J(p)."""
+        rtol = {"rtol": solver.rtol} if self.tightens else {}
+        return objective(self.peer.ask("value", p=p, **rtol), f"{self.who}: value()")
+
+    def gradient(self, p: Array, solver: Solver) -> Result:
+        """J and dJ/dp, with what the adapter says of its solve."""
+        tolerances = {"rtol": solver.rtol, "adjoint_rtol": solver.adjoint_rtol}
+        return _result(self.peer.ask("gradient", p=p, **tolerances, options=self.options), self.peer, self.who)
+
+
+def gradients(command: Command, who: str, model: Model) -> Gradient:
     """Starts the adapter and loads the case; every call asks it for the gradient at p."""
-    peer = Peer(command, who)
-    peer.ask("load", case=model.problem.case())
-    solver = model.solver
-
-    def gradient(p: Array) -> Result:
-        answer = peer.ask("gradient", p=p, rtol=solver.rtol, adjoint_rtol=solver.adjoint_rtol, options=dict(options))
-        return _result(answer, peer, who)
-
-    return gradient
+    foreign = Foreign(command, who, model.problem)
+    return lambda p: foreign.gradient(p, model.solver)
 
 
 def objective(answer: Mapping[str, Any], what: str) -> float:
@@ -81,7 +99,7 @@ def of_manifest(each: Manifest) -> Route:
         return objection
 
     def function(model: Model, p: Array, **options: Any) -> Gradient:
-        return gradients(each.command, each.name, model, options)
+        return gradients(Command(each.command, options), each.name, model)
 
     function.__doc__ = each.summary
     function.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -103,17 +121,7 @@ def of_manifest(each: Manifest) -> Route:
 
 
 def _check(*, command: str) -> None:
-    _words(command)
-
-
-def _words(command: str) -> list[str]:
-    try:
-        words = shlex.split(command)
-    except ValueError as error:
-        raise InputError(f"adapter: command={command}: {error} - close it") from None
-    if not words:
-        raise InputError("adapter: no command - give one: --route 'adapter[command=./mine]'")
-    return words
+    words_of(command)
 
 
 @route(
@@ -126,7 +134,7 @@ def _words(command: str) -> list[str]:
     sound=False,
 )
 def adapter(
-    model: Model, p: Array, *, command: Annotated[str, "that speaks the adapter protocol, in any language"] = ""
+    model: Model, p: Array, *, command: Annotated[str, "that speaks the adapter protocol, or an adapter's FILE.py"] = ""
 ) -> Gradient:
     """Any program that speaks the adapter protocol over stdio."""
-    return gradients(_words(command), "adapter", model, {})
+    return gradients(command_of(command), "adapter", model)

@@ -25,7 +25,7 @@ def _registered(given: Options) -> bool:
 
 def _judged(given: Options) -> bool:
     """Whether there will be a verdict: a problem alone, or a route alone, has its contract checked."""
-    return (given["problem"] is None) == (given["route"] is None)
+    return given["adapter"] is not None or (given["problem"] is None) == (given["route"] is None)
 
 
 STUDY = Study(
@@ -36,6 +36,7 @@ STUDY = Study(
     routes check my_model.py:Model                an object with objective(p), gradient(p) and start
     routes check --objective m.py:J --gradient m.py:dJ --at p.csv
     routes check --problem block --route adjoint
+    routes check --problem bar --adapter mine.py  another code, by its adapter
     routes check --problem my_problem.py:Spring   the contract: shapes, derivatives, transposes, work
 
     The object may offer value_and_gradient(p) instead, and scale, bounds, names, tighten(factor), active_set(p).
@@ -47,6 +48,7 @@ STUDY = Study(
         click.option("--gradient", metavar="FILE.py:NAME", help="A function dJ/dp(p) -> (n_p,), beside --objective."),
         click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract."),
         click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract."),
+        click.option("--adapter", metavar="FILE", help="Another code on --problem: its adapter's script or command."),
         at_option,
         click.option("--budget", type=MANY, default=240, show_default=True, help="Objective calls at most."),
         click.option("--accept", type=FROM_ZERO, default=0.0, metavar="ERROR", help=ACCEPT),

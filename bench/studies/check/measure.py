@@ -11,6 +11,7 @@ from gradient_routes.bench.cases.imported import imported
 from gradient_routes.bench.cases.study import Found, Say
 from gradient_routes.bench.studies.check.conclude import conclude, page_writable
 from gradient_routes.bench.studies.options import one_route, problem_at
+from gradient_routes.bench.verification import adapter as by_adapter
 from gradient_routes.bench.verification import foreign
 from gradient_routes.bench.verification.check import accepted, check
 from gradient_routes.bench.verification.contract import of_problem, of_route
@@ -19,6 +20,7 @@ from gradient_routes.bench.verification.registered import subject
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.foreign.command import command_of
 from gradient_routes.routes.newton import Solver
 
 
@@ -30,6 +32,7 @@ def run(
     gradient: str | None,
     problem: str | None,
     route: str | None,
+    adapter: str | None,
     at: str,
     budget: int,
     accept: float,
@@ -38,20 +41,30 @@ def run(
     html: Path | None,
     kept: Path | None,
 ) -> int:
-    ways = {"a target": target, "--objective": objective or gradient, "--problem or --route": problem or route}
+    ways = {
+        "a target": target,
+        "--objective": objective or gradient,
+        "--problem or --route": problem or route or adapter,
+    }
     given = [name for name, value in ways.items() if value is not None]
     if len(given) != 1:
         what = f"{' and '.join(given)} given" if given else "nothing to check"
         raise InputError(f"check: {what} - give FILE.py:NAME, or --objective and --gradient, or --problem and --route")
-    if (problem is None) != (route is None):
+    if adapter is not None and (problem is None or route is not None):
+        raise InputError("check: --adapter goes with --problem, without --route - give both, or leave it out")
+    if adapter is None and (problem is None) != (route is None):
         return _contract(say, problem, route, at, solver)
     plan = Plan(budget=budget, seed=seed)
     accepted(accept)
-    asked = _subject(target, objective, gradient, problem, route, at, solver)
+    if problem is not None and adapter is not None:
+        made, p = problem_at(problem, at)
+        asked = by_adapter.subject(made, command_of(adapter), adapter, p, solver)
+    else:
+        asked = _subject(target, objective, gradient, problem, route, at, solver)
     page_writable(html, kept, [target, objective, gradient, problem, route, at])
     with stdout_to_stderr():
         found = check(asked, plan, accept)
-    named = {"problem": problem or target or f"{objective} {gradient}", "route": route, "at": at}
+    named = {"problem": problem or target or f"{objective} {gradient}", "route": route or adapter, "at": at}
     return conclude(say, found, named, html)
 
 

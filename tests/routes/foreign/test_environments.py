@@ -1,0 +1,139 @@
+"""Environments of adapters: fitting interpreters, what is installed, and what is said where that fails."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from gradient_routes.bench.environments import building, interpreters
+from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.foreign.manifest import environments, manifest, shipped
+
+SCRIPT = Path(__file__).parent / "bar_adapter.py"
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder for environments."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(building.shutil, "which", lambda name: None)
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def ours(monkeypatch: pytest.MonkeyPatch) -> list[Sequence[str]]:
+    """Instead of pip, which needs an index: what is installed here is visible there. The commands that were run."""
+    real, commands = building._run, []
+
+    def run(command: Sequence[str], who: str) -> None:
+        commands.append(command)
+        if "install" not in command:
+            return real([*command[:-1], "--without-pip", command[-1]], who)
+        (site,) = Path(command[0]).parent.parent.glob("lib/python*/site-packages")
+        shared = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
+        (site / "shared.pth").write_text("\n".join(shared))
+        return None
+
+    monkeypatch.setattr(building, "_run", run)
+    return commands
+
+
+def test_an_environment_is_listed_made_compared_and_used(ours: list[Sequence[str]], cli, monkeypatch) -> None:
+    run = ["run", "--problem=bar", f"--route=adapter[command={SCRIPT}]", "--no-store", "--json", "--no-timing"]
+    (row,) = cli(*run).rows
+    make = f"routes environments create {SCRIPT}"
+    assert (row["status"], row["reason"]) == ("skipped", f"{SCRIPT} has no environment here - make it: {make}")
+    ran = cli(*make.split()[1:])
+    assert (ran.code, ran.err) == (0, "")
+    assert f"{SCRIPT.stem}: " in ran.out
+    assert "gradient on bar off ours by" in ran.out
+    assert ours[1][1:] == ["-m", "pip", "install", "--quiet", "numpy"]
+    (row,) = cli(*run).rows
+    assert (row["status"], row["peer"]["name"], row["peer"]["forward_s"]) == ("ok", "bar-by-hand", 1e-6)
+    assert row["gradient_error"] < 1e-14
+    assert row["peer"]["versions"].keys() == {"numpy"}
+    (row,) = cli(*[word.replace("=bar", "=bar[parametrization=raw]", 1) for word in run]).rows
+    assert (row["status"], row["reason"]) == ("skipped", "adapter: load(): Unsupported: log E, not raw")
+
+
+def test_every_adapter_is_listed_with_the_command_that_makes_its_environment(cli) -> None:
+    out = cli("environments").out
+    for name in shipped():
+        assert f"missing: routes environments create {name}" in out
+
+
+def test_a_route_without_its_environment_is_skipped_with_that_command(cli) -> None:
+    (row,) = cli("run", "--problem=bar", "--route=jax", "--no-store", "--json").rows
+    assert (row["status"], row["reason"].partition(" - ")[2]) == ("skipped", "make it: routes environments create jax")
+
+
+def test_what_another_version_needs_has_another_folder(tmp_path: Path) -> None:
+    text = SCRIPT.read_text()
+    folders = set()
+    for wanted in ("numpy", "numpy>=2"):
+        (tmp_path / SCRIPT.name).write_text(text.replace('"numpy"', f'"{wanted}"'))
+        folders.add(manifest(tmp_path / SCRIPT.name).folder)
+    assert len(folders) == 2
+    assert {folder.parent for folder in folders} == {environments()}
+
+
+def test_of_a_failing_install_the_last_line_is_shown_and_nothing_is_taken_for_ready() -> None:
+    pip = [sys.executable, "-m", "pip", "install", "--no-index", "no-package-of-that-name"]
+    with pytest.raises(building.NotInstalled, match=r"bar: python.* ended with exit code 1: ERROR: No matching dist"):
+        building._run(pip, "bar")
+
+
+def test_a_failed_environment_is_not_ready(monkeypatch: pytest.MonkeyPatch, cli) -> None:
+    def fail(command: Sequence[str], who: str) -> None:
+        Path(command[-1]).mkdir(parents=True, exist_ok=True)
+        raise building.NotInstalled(f"{who}: pip ended with exit code 1: ERROR: no space left")
+
+    monkeypatch.setattr(building, "_run", fail)
+    ran = cli("environments", "create", "jax")
+    assert (ran.code, ran.err) == (1, "routes: jax: pip ended with exit code 1: ERROR: no space left\n")
+    assert not manifest(shipped()["jax"]).ready
+
+
+@pytest.mark.parametrize(
+    ("requires", "says"),
+    [
+        (">=3.99", r"mine: needs Python >=3.99, here is 3\.\d+\.\d+.* - install one, by uv, pyenv or your system"),
+        ("three", "mine: requires-python = 'three' is no version specifier - write '>=3.12'"),
+    ],
+)
+def test_an_interpreter_that_is_missing_is_named(requires: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        interpreters.fitting(requires, "mine")
+
+
+def test_ours_is_taken_where_it_fits_and_one_that_does_not_run_is_none() -> None:
+    assert interpreters.fitting(">=3.11", "mine") == Path(sys.executable)
+    assert interpreters.version_of(Path("/bin/false")) is None
+    assert interpreters.version_of(Path("/nowhere/python")) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("print()", "has no inline metadata, a comment '# /// script' - see the guide"),
+        ("# /// script\n# dependencies = [\n# ///\n", "its inline metadata cannot be read"),
+        ("# /// script\n# dependencies = []\n# ///\n", "its table tool.gradient-routes lacks 'summary' - add it"),
+        (None, "cannot be read"),
+    ],
+)
+def test_a_script_without_metadata_says_what_it_lacks(text: str | None, says: str, tmp_path: Path, cli) -> None:
+    script = tmp_path / "mine.py"
+    if text is not None:
+        script.write_text(text)
+    ran = cli("environments", "create", shlex.quote(str(script)))
+    assert ran.code == 2
+    assert says in ran.err
+
+
+def test_a_mistyped_name_is_answered_with_the_nearest(cli) -> None:
+    ran = cli("environments", "create", "jaxx")
+    assert (ran.code, ran.err) == (2, "routes: no adapter 'jaxx' - did you mean 'jax'?\n")
