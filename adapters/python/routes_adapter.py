@@ -69,7 +69,8 @@ def serve(adapter, name, versions=(), **about):
             kind = "memory" if isinstance(error, MemoryError) else getattr(error, "kind", "bug")
             if kind == "bug":
                 traceback.print_exc()
-            _send({"id": asked["id"], "error": {"kind": kind, "message": f"{type(error).__name__}: {error}"}})
+            message = str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
+            _send({"id": asked["id"], "error": {"kind": kind, "message": message}})
         if method == "bye":
             return
 
@@ -85,10 +86,12 @@ def _send(message):
 def _packed(value, frames):
     if isinstance(value, dict):
         return {key: _packed(each, frames) for key, each in value.items()}
-    if isinstance(value, np.generic):
+    if isinstance(value, (np.generic, np.ndarray)) and value.ndim == 0:
         return value.item()
     if not isinstance(value, np.ndarray):
         return value
+    if value.dtype.kind not in "fiub":
+        raise TypeError(f"an array of {value.dtype} - give real numbers")
     array = np.ascontiguousarray(value, "<f8")
     if array.nbytes < FRAMED:
         return {"float64": array.shape, "base64": base64.b64encode(array.tobytes()).decode()}

@@ -63,10 +63,10 @@ def receive(stream: IO[bytes]) -> dict[str, Any]:
 def _packed(value: Any, frames: list[Any]) -> Any:
     if isinstance(value, np.ndarray):
         name = "int64" if value.dtype.kind in "biu" else "float64"
-        array = np.ascontiguousarray(value, DTYPES[name])
+        array = np.asarray(value, DTYPES[name], order="C")
         if array.nbytes < FRAMED:
             return {name: array.shape, "base64": base64.b64encode(array.tobytes()).decode()}
-        frames.append(array.data.cast("B"))
+        frames.append(array.reshape(-1).view(np.uint8).data)
         return {name: array.shape, "frame": array.nbytes}
     if isinstance(value, dict):
         return {key: _packed(each, frames) for key, each in value.items()}

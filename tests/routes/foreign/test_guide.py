@@ -1,0 +1,39 @@
+"""The adapter that the guide has its reader write is right, runs and is described by its metadata."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from commands import ROOT
+
+from gradient_routes.routes.foreign.manifest import ADAPTERS, START, manifest
+
+GUIDE = ROOT / "docs" / "how-to" / "other-frameworks.md"
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    (block,) = re.findall(r"^```py\n(.*?)^```$", GUIDE.read_text(), re.MULTILINE | re.DOTALL)
+    (tmp_path / "mine.py").write_text(block)
+    return tmp_path / "mine.py"
+
+
+def test_its_metadata_can_be_read(mine: Path) -> None:
+    found = manifest(mine)
+    assert (found.name, found.dependencies, dict(found.cases)) == ("mine", ("numpy",), {"bar": {}})
+
+
+def test_its_gradient_is_ours_and_that_of_its_J(mine: Path, cli) -> None:
+    command = shlex.join([sys.executable, "-c", START, str(ADAPTERS / "python"), str(mine)])
+    found = json.loads(cli("check", "--problem=bar", f"--adapter={command}", "--no-store", "--json").out)
+    assert found["verdict"] == "agrees"
+    assert not found["remarks"]
+
+
+def test_it_is_as_short_as_the_guide_says(mine: Path) -> None:
+    assert len(mine.read_text().splitlines()) <= 45
