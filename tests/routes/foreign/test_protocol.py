@@ -32,7 +32,7 @@ MINE = Command([sys.executable, "-c", START, str(ADAPTERS / "python"), str(SCRIP
 
 def transcripts() -> list[list[tuple[str, Any]]]:
     """Those of the guide: who speaks, and the message."""
-    blocks = re.findall(r"^```transcript\n(.*?)^```$", PROTOCOL.read_text(), re.MULTILINE | re.DOTALL)
+    blocks = re.findall(r"^```text\n(-> .*?)^```$", PROTOCOL.read_text(), re.MULTILINE | re.DOTALL)
     return [[read(line[:2], line[3:]) for line in block.splitlines()] for block in blocks]
 
 
