@@ -6,6 +6,8 @@ import hashlib
 import json
 import platform
 from dataclasses import asdict
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases import case, declared
@@ -16,6 +18,7 @@ from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.sources import Source, Stamp, digest, stamp, stamps
+from gradient_routes.routes.foreign.manifest import shipped
 
 HARNESS = 5  # raised when rows come to mean something else: all that was kept before is then stale
 
@@ -47,19 +50,34 @@ def settings_of(settings: Settings, threads: int) -> dict[str, Any]:
 
 def content_key(case_key: str, problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> str:
     """Another one where code, data, libraries or the harness have changed."""
-    return content_key_of(case_key, [source_by(problem.build), source_by(route.route)], problem.options, at)
+    code, run = [source_by(problem.build), source_by(route.route)], programs(route.name, route.options)
+    return content_key_of(case_key, code, run, problem.options, at)
 
 
-def content_key_of(case_key: str, code: list[Source], problem_options: dict[str, Any], at: str) -> str:
+def content_key_of(case_key: str, code: list[Source], run: list[Path], problem_options: dict[str, Any], at: str) -> str:
     """The same, of what a row holds: files are read, nothing is run."""
-    data = [hashlib.sha256(located(file).read_bytes()).hexdigest() for file in case.files([problem_options], at)]
+    read = [*case.files([problem_options], at), *run]
+    data = [hashlib.sha256(located(file).read_bytes()).hexdigest() for file in read]
     digests = [digest(each) for each in code]
     return hashed(case_key, digests, data, versions(), platform.python_version(), HARNESS)
 
 
+def programs(route: str, options: Row) -> list[Path]:
+    """The files that a route runs in another process: the script of an adapter, the words of a command."""
+    words = str(options.get("command", "")).replace("'", " ").replace('"', " ").split()
+    script = _adapters().get(route)
+    return [*([] if script is None else [script]), *(Path(word) for word in words if located(word).is_file())]
+
+
+@cache
+def _adapters() -> dict[str, Path]:
+    return shipped()
+
+
 def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:
     """The files that a content key is of: as long as they are as they were, so is what it stands for."""
-    data = tuple(stamp(located(file)) for file in case.files([problem.options], at))
+    read = [*case.files([problem.options], at), *programs(route.name, route.options)]
+    data = tuple(stamp(located(file)) for file in read)
     return (*stamps(source_by(problem.build)), *stamps(source_by(route.route)), *data)
 
 

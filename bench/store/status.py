@@ -11,7 +11,7 @@ from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.declared import source_of
 from gradient_routes.bench.cases.imported import is_reference
-from gradient_routes.bench.cases.keys import content_key_of
+from gradient_routes.bench.cases.keys import content_key_of, programs
 from gradient_routes.bench.cases.sources import Source, source
 from gradient_routes.bench.store.cases import cases
 from gradient_routes.bench.store.store import Store
@@ -55,7 +55,10 @@ def _aged(row: Row) -> str | None:
         code = [_source("problem", row), _source("route", row)]
         if None in code:
             return UNCHECKED
-        now = content_key_of(row["case_key"], [each for each in code if each], row["problem_options"] or {}, row["at"])
+        run = programs(row["route"], row["route_options"] or {})
+        now = content_key_of(
+            row["case_key"], [each for each in code if each], run, row["problem_options"] or {}, row["at"]
+        )
     except (InputError, OSError):
         return GONE
     return None if now == row["content_key"] else STALE

@@ -39,3 +39,12 @@ def test_its_gradient_is_ours_and_that_of_its_J(of: str, mine: Path, cli) -> Non
 
 def test_it_is_as_short_as_the_guide_says(mine: Path) -> None:
     assert len(mine.read_text().splitlines()) <= 45
+
+
+def test_a_row_is_stale_once_the_adapter_has_changed(mine: Path, cli) -> None:
+    command = f"{sys.executable} {mine}"  # it cannot be started so, which is a row as well
+    run = ["run", "--problem=bar", f"--route=adapter[command={command}]", "--json", "--no-timing"]
+    assert cli(*run).rows[0]["status"] == "crashed"
+    assert "1 crashed" in cli("status").out
+    mine.write_text(mine.read_text() + "# changed\n")
+    assert "1 crashed (stale)" in cli("status").out
