@@ -55,6 +55,9 @@ def test_an_environment_is_listed_made_compared_and_used(ours: list[Sequence[str
     (row,) = cli(*run).rows
     assert (row["status"], row["peer"]["name"], row["peer"]["forward_s"]) == ("ok", "bar-by-hand", 1e-6)
     assert row["gradient_error"] < 1e-14
+    assert row["memory_method"] == "by bar-by-hand itself"
+    if sys.platform == "linux":
+        assert row["peak_bytes"] == row["peer"]["peak_bytes"] >= 0
     assert row["peer"]["versions"].keys() == {"numpy"}
     (row,) = cli(*[word.replace("=bar", "=bar[parametrization=raw]", 1) for word in run]).rows
     assert (row["status"], row["reason"]) == ("skipped", "adapter: load(): log E, not raw")
