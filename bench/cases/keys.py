@@ -18,7 +18,7 @@ from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.sources import Source, Stamp, digest, stamp, stamps
-from gradient_routes.routes.foreign.manifest import shipped
+from gradient_routes.routes.foreign.manifest import ADAPTERS, shipped
 
 HARNESS = 5  # raised when rows come to mean something else: all that was kept before is then stale
 
@@ -65,13 +65,14 @@ def content_key_of(case_key: str, code: list[Source], run: list[Path], problem_o
 def programs(route: str, options: Row) -> list[Path]:
     """The files that a route runs in another process: the script of an adapter, the words of a command."""
     words = str(options.get("command", "")).replace("'", " ").replace('"', " ").split()
-    script = _adapters().get(route)
-    return [*([] if script is None else [script]), *(Path(word) for word in words if located(word).is_file())]
+    return [*_adapters().get(route, ()), *(Path(word) for word in words if located(word).is_file())]
 
 
 @cache
-def _adapters() -> dict[str, Path]:
-    return shipped()
+def _adapters() -> dict[str, list[Path]]:
+    """Their scripts, each with what they share."""
+    shared = sorted((ADAPTERS / "python").glob("*.py"))
+    return {name: [script, *shared] for name, script in shipped().items()}
 
 
 def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:
