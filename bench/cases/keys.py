@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -18,7 +19,8 @@ from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.row import clean
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.cases.sources import Source, Stamp, digest, stamp, stamps
-from gradient_routes.routes.foreign.manifest import ADAPTERS, shipped
+from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.foreign.manifest import ADAPTERS, manifest, shipped
 
 HARNESS = 5  # raised when rows come to mean something else: all that was kept before is then stale
 
@@ -63,16 +65,22 @@ def content_key_of(case_key: str, code: list[Source], run: list[Path], problem_o
 
 
 def programs(route: str, options: Row) -> list[Path]:
-    """The files that a route runs in another process: the script of an adapter, the words of a command."""
+    """The files that a route runs in another process: the script of an adapter, what shows that its environment has
+    been made, and the words of a command.
+    """
     words = str(options.get("command", "")).replace("'", " ").replace('"', " ").split()
-    return [*_adapters().get(route, ()), *(Path(word) for word in words if located(word).is_file())]
+    files = [*map(Path, words), *_adapters().get(route, ())]
+    if len(words) == 1 and words[0].endswith(".py"):
+        with suppress(InputError):
+            files.append(manifest(located(words[0])).mark)
+    return [file for file in files if located(file).is_file()]
 
 
 @cache
 def _adapters() -> dict[str, list[Path]]:
-    """Their scripts, each with what they share."""
+    """Of each the script, what scripts share, and the mark of its environment."""
     shared = sorted((ADAPTERS / "python").glob("*.py"))
-    return {name: [script, *shared] for name, script in shipped().items()}
+    return {name: [script, *shared, manifest(script).mark] for name, script in shipped().items()}
 
 
 def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tuple[Stamp, ...]:

@@ -34,7 +34,7 @@ def create(manifest: Manifest) -> Path:
     for needed, alone in ((manifest.dependencies, []), (manifest.without_dependencies, ["--no-deps"])):
         if needed:
             _run([*install, *alone, *needed], manifest.name)
-    (folder / "ready").write_text("\n".join((*manifest.dependencies, *manifest.without_dependencies)) + "\n")
+    manifest.mark.write_text("\n".join((*manifest.dependencies, *manifest.without_dependencies)) + "\n")
     return folder
 
 

@@ -64,7 +64,12 @@ class Manifest:
     @property
     def ready(self) -> bool:
         """Whether its environment has been made, to its end."""
-        return (self.folder / "ready").is_file()
+        return self.mark.is_file()
+
+    @property
+    def mark(self) -> Path:
+        """The file that is written last."""
+        return self.folder / "ready"
 
     def unknown(self, case: Mapping[str, Any]) -> str | None:
         """What of a case it does not know, in a sentence; None where it knows all."""
