@@ -114,6 +114,61 @@ def test_an_interpreter_that_is_missing_is_named(requires: str, says: str) -> No
         interpreters.fitting(requires, "mine")
 
 
+def interpreter(path: Path, version: str) -> Path:
+    """A program that says it is of that version."""
+    path.parent.mkdir(parents=True)
+    path.write_text(f"#!/bin/sh\necho {version}\n")
+    path.chmod(0o755)
+    return path
+
+
+def test_one_of_the_path_or_of_pyenv_is_taken_where_ours_does_not_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    named = interpreter(tmp_path / "bin" / "python3.19", "3.19.2")
+    of_pyenv = interpreter(tmp_path / "pyenv" / "versions" / "3.18.1" / "bin" / "python", "3.18.1")
+    monkeypatch.setattr(interpreters.shutil, "which", lambda name: str(named) if name == "python3.19" else None)
+    monkeypatch.setenv("PYENV_ROOT", str(tmp_path / "pyenv"))
+    assert interpreters.fitting(">=3.19", "mine") == named
+    assert interpreters.fitting("==3.18.*", "mine") == of_pyenv
+    with pytest.raises(InputError, match=r"needs Python >=3\.20, here is .*, 3\.19\.2, 3\.18\.1 - install one"):
+        interpreters.fitting(">=3.20", "mine")
+
+
+def test_an_adapter_without_packages_needs_no_index(tmp_path: Path) -> None:
+    script = tmp_path / "plain.py"
+    script.write_text(SCRIPT.read_text().replace('["numpy"]', "[]"))
+    found = manifest(script)
+    assert not found.ready
+    folder = building.create(found)
+    assert found.ready
+    assert building.weight(folder) > 0
+    assert interpreters.version_of(found.python) == interpreters.version_of(Path(sys.executable))
+    assert not list(folder.glob("lib/python*/site-packages/pip"))
+
+
+@pytest.mark.parametrize("uv", [None, "/there/uv"])
+def test_uv_makes_it_where_it_is_installed(uv: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = tmp_path / "two.py"
+    alone = '# [tool.gradient-routes]\n# without-dependencies = ["alone==1"]'
+    script.write_text(SCRIPT.read_text().replace("# [tool.gradient-routes]", alone))
+    commands: list[list[str]] = []
+    monkeypatch.setattr(building.shutil, "which", lambda name: uv if name == "uv" else None)
+    monkeypatch.setattr(building, "_run", lambda command, who: commands.append([*map(str, command)]))
+    found = manifest(script)
+    found.folder.mkdir(parents=True)
+    monkeypatch.setattr(building.shutil, "rmtree", lambda *arguments, **options: None)
+    building.create(found)
+    python, there = sys.executable, str(found.python)
+    make = [uv, "venv", "--quiet", "--python", python] if uv else [python, "-m", "venv"]
+    install = [uv, "pip", "install", "--quiet", "--python", there] if uv else [there, "-m", "pip", "install", "--quiet"]
+    assert commands == [
+        [*make, str(found.folder)],
+        [*install, "numpy"],
+        [*install, "--no-deps", "alone==1"],
+    ]
+
+
 def test_ours_is_taken_where_it_fits_and_one_that_does_not_run_is_none() -> None:
     assert interpreters.fitting(">=3.11", "mine") == Path(sys.executable)
     assert interpreters.version_of(Path("/bin/false")) is None
