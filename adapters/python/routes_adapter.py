@@ -26,6 +26,7 @@ import numpy as np  # noqa: E402
 
 PROTOCOL, FRAMED = 1, 65_536
 MEASURED = 2  # calls of `gradient` whose memory is measured, which takes 0.1 ms: one compiles, the next does not
+_gradients = count()
 
 
 class Refusal(Exception):
@@ -52,7 +53,6 @@ class Unsupported(Refusal):
 
 def serve(adapter, name, versions=(), **about):
     """Answers until `bye` or the end of input. `about`: more of what `describe` says."""
-    gradients = count()
     while True:
         line = _IN.readline()
         if not line:
@@ -65,7 +65,7 @@ def serve(adapter, name, versions=(), **about):
                 said = {"protocol": PROTOCOL, "name": name, "versions": known, **about}
             elif method == "bye":
                 said = {}
-            elif method == "gradient" and next(gradients) < MEASURED:
+            elif method == "gradient" and next(_gradients) < MEASURED:
                 said = _measured(adapter.gradient, arguments)
             else:
                 said = getattr(adapter, method)(**arguments)
