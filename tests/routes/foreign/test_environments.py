@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 from gradient_routes.bench.environments import building, interpreters
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import InputError
+from gradient_routes.routes.foreign.foreign import of_manifest
 from gradient_routes.routes.foreign.manifest import environments, manifest, shipped
 
 SCRIPT = Path(__file__).parent / "bar_adapter.py"
@@ -73,6 +76,23 @@ def test_every_adapter_is_listed_with_the_command_that_makes_its_environment(cli
 def test_a_route_without_its_environment_is_skipped_with_that_command(cli) -> None:
     (row,) = cli("run", "--problem=bar", "--route=jax", "--no-store", "--json").rows
     assert (row["status"], row["reason"].partition(" - ")[2]) == ("skipped", "make it: routes environments create jax")
+
+
+def test_of_a_case_that_is_not_known_it_is_said_what_differs() -> None:
+    route = of_manifest(manifest(SCRIPT))
+    assert route.objection(Bar(parametrization="raw")) == "bar_adapter knows parametrization log, not raw"
+    assert route.objection(Block(n=1)) == "bar_adapter knows bar, not hyperelastic"
+    assert route.objection(Bar(alpha=0.1)) == "bar: alpha=0.1 is not described to other codes - leave it out"
+    assert route.objection(Bar()) == (
+        "bar_adapter has no environment here - make it: routes environments create bar_adapter"
+    )
+
+
+def test_options_are_those_of_the_metadata_the_default_first() -> None:
+    route = of_manifest(manifest(SCRIPT))
+    assert route.defaults == {"sums": "cumulative"}
+    assert route.summary == "the bar by cumulative sums, for tests"
+    assert not route.sound, "`all` does not include other codes"
 
 
 def test_what_another_version_needs_has_another_folder(tmp_path: Path) -> None:
