@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import sys
-import time
 from pathlib import Path
 
 import psutil
 import pytest
 from click.testing import CliRunner
-from commands import Ran
+from commands import Ran, eventually
 
 from gradient_routes.bench.cli import main
 
@@ -53,10 +53,10 @@ def route(kind: str) -> str:
     return f"adapter[command={sys.executable} -IS {ADAPTER} {kind}]"
 
 
-def started(word: str) -> list[psutil.Process]:
-    """Processes of the adapter that have `word` among their arguments."""
-    found = [process for process in psutil.process_iter(["cmdline"]) if process.info["cmdline"]]
-    return [process for process in found if {str(ADAPTER), word} <= {*process.info["cmdline"]}]
+def running() -> list[list[str]]:
+    """What the adapters were told that still run."""
+    found = [process.info["cmdline"] or [] for process in psutil.process_iter(["cmdline"])]
+    return [words for words in found if str(ADAPTER) in words]
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +88,11 @@ def test_the_others_of_the_run_are_as_alone(rows: dict) -> None:
     assert rows["adjoint"]["gradient_error"] < 1e-15
 
 
+def test_none_of_their_processes_is_left(rows: dict) -> None:
+    gc.collect()
+    eventually(lambda: not [words for words in running() if words[-1] in ROWS])
+
+
 def test_what_another_code_says_of_itself_is_kept(rows: dict) -> None:
     assert rows["another-J"]["peer"] == {"name": "another-J", "versions": {"it": "[1, 2]"}}
     assert rows["another-J"]["memory_method"] == "by another-J itself"
@@ -97,10 +102,7 @@ def test_one_that_hangs_is_ended_at_the_limit_with_its_process(cli) -> None:
     ran = cli(*"run --problem bar --no-store --json --isolate --timeout 3 --route".split(), route("hangs"))
     (row,) = ran.rows
     assert (ran.code, row["status"]) == (1, "timeout")
-    deadline = time.monotonic() + 60
-    while started("hangs") and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert not started("hangs")
+    eventually(lambda: not [words for words in running() if words[-1] == "hangs"])
 
 
 @pytest.mark.parametrize(
