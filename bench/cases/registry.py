@@ -144,6 +144,8 @@ ORDER = (
     "faulty-adjoint",
     "adapter",
     "jax",
+    "torch",
+    "torch-fem",
     "run",
     "scaling",
     "vcurve",

@@ -29,7 +29,10 @@ from typing import Any
 from gradient_routes.problems.errors import InputError
 
 ADAPTERS = Path(__file__).absolute().parent.parent.parent / "adapters"
-START = "import runpy, sys; sys.path[0] = sys.argv[1]; runpy.run_path(sys.argv[2], run_name='__main__')"
+START = """import runpy, sys
+sys.path[0] = sys.argv[1]
+import routes_adapter  # before the framework: what is printed goes to stderr from then on
+runpy.run_path(sys.argv[2], run_name="__main__")"""
 BLOCK = re.compile(r"(?m)^# /// script$\s(?P<content>(^#(| .*)$\s)+)^# ///$")  # PEP 723's own expression
 
 

@@ -10,3 +10,5 @@ def _route(name: str) -> Route:
 
 
 jax = _route("jax")
+torch = _route("torch")
+torch_fem = _route("torch-fem")
