@@ -34,7 +34,6 @@ class TorchFem:
             forces, data = torch.zeros_like(x), self.case["data"][:, None]
             forces[-1], cells = case["load"], torch.arange(n)[:, None] + torch.arange(2)
             self.case.update(points=x, cells=cells, forces=forces, clamped=0, data=data)
-        return {}
 
     def model(self, E):
         case, nu = self.case, self.case.get("nu")

@@ -25,7 +25,6 @@ class Bar:
         self.sensors, self.d = torch.as_tensor(case["sensors"]) - 1, torch.as_tensor(case["data"])
         self.stiffness = case["area"] * n / case["length"]
         self.log = case["parametrization"] == "log"
-        return {}
 
     def J(self, p, solve):
         k = self.stiffness * (torch.exp(p) if self.log else p)

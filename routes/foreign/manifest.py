@@ -10,7 +10,7 @@
     # ///
 
 cases: the kinds of Problem.case() that it knows, with the values it knows where it does not know all. options: each
-with its choices, the default first.
+with its choices, the default first. environment, where it is not the script's name: one that adapters share.
 """
 
 from __future__ import annotations
@@ -48,12 +48,13 @@ class Manifest:
     without_dependencies: tuple[str, ...]
     cases: Mapping[str, Mapping[str, list[Any]]]
     options: Mapping[str, list[str]]
+    environment: str
 
     @cached_property
     def folder(self) -> Path:
         """Of its environment: another one for every change of what it needs."""
         needs = "\n".join((self.requires_python, *self.dependencies, *self.without_dependencies))
-        return environments() / f"{self.name}-{hashlib.sha256(needs.encode()).hexdigest()[:8]}"
+        return environments() / f"{self.environment}-{hashlib.sha256(needs.encode()).hexdigest()[:8]}"
 
     @property
     def python(self) -> Path:
@@ -113,6 +114,7 @@ def manifest(script: Path) -> Manifest:
             without_dependencies=tuple(map(str, ours.get("without-dependencies", []))),
             cases={str(kind): dict(known) for kind, known in ours["cases"].items()},
             options={str(name): list(map(str, choices)) for name, choices in ours.get("options", {}).items()},
+            environment=str(ours.get("environment", script.stem)),
         )
     except (tomllib.TOMLDecodeError, AttributeError, TypeError, ValueError) as error:
         raise InputError(f"adapter {script}: its inline metadata cannot be read: {error} - mend them") from None

@@ -10,5 +10,9 @@ def _route(name: str) -> Route:
 
 
 jax = _route("jax")
+lineax = _route("lineax")
+taichi = _route("taichi")
 torch = _route("torch")
 torch_fem = _route("torch-fem")
+warp = _route("warp")
+warp_unrolled = _route("warp-unrolled")

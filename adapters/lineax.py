@@ -1,0 +1,49 @@
+# /// script
+# requires-python = ">=3.11"
+# dependencies = ["lineax==0.1.1", "optimistix==0.1.0", "jax==0.10.2", "numpy>=2"]
+# [tool.gradient-routes]
+# summary = "Lineax and Optimistix: implicit differentiation of a linear solve, or of Newton's method"
+# cases = { bar = {} }
+# options = { solver = ["tridiagonal", "cg", "newton"] }
+# ///
+"""The bar in Lineax, a tridiagonal operator and its solve, or in Optimistix, the root of the residual."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import lineax as lx
+import optimistix as optx
+from routes_adapter import serve
+
+jax.config.update("jax_enable_x64", True)
+eqx.EquinoxRuntimeError.kind = "not-converged"
+
+
+class Bar:
+    def load(self, case):
+        self.case = case
+        self.f = jnp.zeros(case["n"]).at[-1].set(case["load"])
+
+    def J(self, p, rtol=1e-12, solver="tridiagonal"):
+        E = jnp.exp(p) if self.case["parametrization"] == "log" else p
+        k = E * self.case["area"] * self.case["n"] / self.case["length"]
+        diagonal, beside = k + jnp.append(k[1:], 0.0), -k[1:]
+        K = lx.TridiagonalLinearOperator(diagonal, beside, beside)
+        atol = rtol * self.case["load"]  # with 0, CG returns 0 and Newton never ends
+        if solver == "newton":
+            newton = optx.Newton(rtol, atol)
+            u = optx.root_find(lambda u, K: K.mv(u) - self.f, newton, jnp.zeros_like(self.f), args=K).value
+        else:
+            K = lx.TaggedLinearOperator(K, lx.positive_semidefinite_tag)
+            u = lx.linear_solve(K, self.f, lx.CG(rtol, atol) if solver == "cg" else lx.Tridiagonal()).value
+        return 0.5 * jnp.sum((u[self.case["sensors"] - 1] - self.case["data"]) ** 2)
+
+    def value(self, p):
+        return float(self.J(p))
+
+    def gradient(self, p, rtol, adjoint_rtol, options):
+        J, g = jax.value_and_grad(self.J)(p, rtol, options["solver"])
+        return {"J": float(J), "gradient": jax.device_get(g)}
+
+
+serve(Bar(), "lineax", versions=["lineax", "optimistix", "jax"])

@@ -1,0 +1,56 @@
+"""Adapters of this package: what their metadata say, and their gradients where their environments are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+import pytest
+from conftest import relative_error, somewhere
+
+from gradient_routes.bench.cases.registry import entries
+from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.block import Block
+from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.foreign.foreign import of_manifest
+from gradient_routes.routes.foreign.manifest import Manifest, manifest, shipped
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver
+
+MANIFESTS = {name: manifest(script) for name, script in shipped().items()}
+PROBLEMS = {"bar": lambda **options: Bar(n=8, **options), "hyperelastic": lambda **options: Block(n=2, **options)}
+# to rounding: Newton's last step may end just below a looser tolerance or many digits below it
+TIGHT = {"bar": Solver(rtol=1e-13, adjoint_rtol=1e-13), "hyperelastic": Solver(rtol=1e-14, adjoint_rtol=1e-13)}
+# the others: 1e-12, the tolerance times a condition number; the gradient of an iterate lags behind it by k rho^k
+ACCURACY = {"warp-unrolled": 1e-10, "taichi": 1e-10}
+
+
+def cases() -> Iterator[Any]:
+    """Every adapter on every problem that it knows, with every option; with log E, and at its defaults with E too."""
+    for name, found in MANIFESTS.items():
+        for kind, (number, choices) in product(found.cases, enumerate(product(*found.options.values()))):
+            for parametrization in ("raw", "log")[number > 0 :]:
+                options = dict(zip(found.options, choices, strict=True))
+                label = "-".join((name, kind, parametrization, *choices))
+                yield pytest.param(found, kind, parametrization, options, id=label)
+
+
+@pytest.mark.parametrize(("found", "kind", "parametrization", "options"), list(cases()))
+def test_the_gradient_is_ours(found: Manifest, kind: str, parametrization: str, options: dict[str, str]) -> None:
+    if not found.ready:
+        pytest.skip(f"{found.name} has no environment here: routes environments create {found.name}")
+    problem, solver = PROBLEMS[kind](parametrization=parametrization), TIGHT[kind]
+    p = somewhere(problem)
+    J, expected, *_ = adjoint.prepare(Model(problem, solver), p)(p)
+    result = of_manifest(found).prepare(Model(problem, solver), p, **options)(p)
+    tolerance = ACCURACY.get(found.name, 1e-12)
+    assert result.J == pytest.approx(J, rel=tolerance)
+    assert relative_error(result.gradient, expected) <= tolerance
+
+
+@pytest.mark.parametrize("name", MANIFESTS)
+def test_an_adapter_is_a_route_and_short(name: str) -> None:
+    assert entries("route")[name].failure is None
+    code = MANIFESTS[name].script.read_text().split('"""', 2)[2].splitlines()
+    assert len([line for line in code if line.strip() and not line.lstrip().startswith("#")]) <= 45
