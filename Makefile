@@ -11,7 +11,7 @@ CHECKED := adjoint faulty-adjoint
 TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-pythons lint type gate baseline benchmark benchmark-regression benchmark-baseline faults mutants reports reference docs vega clean
+.PHONY: help demo test test-pythons lint type gate baseline adapters benchmark benchmark-regression benchmark-baseline faults mutants reports reference docs vega clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -80,6 +80,9 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.loads
 	$(BIN)/python -m benchmarks.error_bars
 	$(BIN)/python -m benchmarks.adapter_overhead
+
+adapters: $(READY) ## environments of Taichi, Warp and torch-fem, with which the tests run their adapters (2.5 GB)
+	$(BIN)/routes environments create taichi warp torch-fem
 
 faults: $(READY) ## 300 kills, full disks and read-only stores at random points of sweeps: is anything lost? (half an hour)
 	$(BIN)/python -m benchmarks.faults

@@ -47,13 +47,13 @@ class TorchFem:
         model.forces, model.constraints[case["clamped"]] = case["forces"], True
         return model
 
-    def J(self, p, rtol=1e-12, stol=1e-12, method="direct"):
+    def J(self, p, rtol, stol, method="direct"):
         model = self.model(torch.exp(p) if self.case["parametrization"] == "log" else p)
         u, *_ = model.solve(rtol=rtol, atol=0.0, stol=stol, method=method, differentiable_parameters=p)
         return 0.5 * ((u[self.case["sensors"]] - self.case["data"]) ** 2).sum()
 
-    def value(self, p):
-        return self.J(torch.as_tensor(p)).item()
+    def value(self, p, rtol=1e-12):
+        return self.J(torch.as_tensor(p), rtol, rtol).item()
 
     def gradient(self, p, rtol, adjoint_rtol, options):
         p, start = torch.tensor(p, requires_grad=True), perf_counter()
@@ -64,4 +64,4 @@ class TorchFem:
         return {"J": J.item(), "gradient": p.grad.numpy(), **seconds}
 
 
-serve(TorchFem(), "torch-fem", versions=["torch-fem", "torch"])
+serve(TorchFem(), "torch-fem", versions=["torch-fem", "torch"], tighten=True)

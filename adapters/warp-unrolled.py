@@ -41,10 +41,10 @@ class Bar:
         self.case, self.k, self.log = case, case["area"] * case["n"] / case["length"], case["parametrization"] == "log"
         self.sensors, self.data = wp.array(case["sensors"]), wp.array(case["data"])
 
-    def value(self, p):
-        return self.gradient(p)["J"]
+    def value(self, p, rtol=1e-12):
+        return self.gradient(p, rtol)["J"]
 
-    def gradient(self, p, rtol=1e-12, adjoint_rtol=1e-12, options=None):
+    def gradient(self, p, rtol, adjoint_rtol=None, options=None):
         n, E = len(p), [math.exp(x) if self.log else x for x in p]
         root_L, root_mu = 2 * (self.k * max(E)) ** 0.5, 2 * (self.k * min(E)) ** 0.5 * math.sin(math.pi / (4 * n + 2))
         alpha, rate = 4 / (root_L + root_mu) ** 2, (root_L - root_mu) / (root_L + root_mu)
@@ -63,4 +63,4 @@ def zeros(n):
     return wp.zeros(n, dtype=real, requires_grad=True)
 
 
-serve(Bar(), "warp-unrolled", versions=["warp-lang"])
+serve(Bar(), "warp-unrolled", versions=["warp-lang"], tighten=True)

@@ -2,61 +2,65 @@
 # requires-python = ">=3.10"
 # dependencies = ["warp-lang==1.19.0", "numpy>=2", "scipy>=1.11"]
 # [tool.gradient-routes]
-# summary = "Warp: R by warp.fem on a tape, whose backward sweeps give R_u^T v and R_p^T lam"
+# summary = "Warp: forms by warp.fem, the adjoint by hand, R_p^T lam by a tape of the kernel of R"
 # cases = { hyperelastic = { law = ["neo-hookean"], cell_type = ["hexahedron"] } }
 # ///
-"""The block in warp.fem: Newton's method and the adjoint by conjugate gradients over the tape of R."""
+"""The block in warp.fem: forms of R and R_u as integrands, a tape over that of R."""
 
 import numpy as np
 import warp as wp
 import warp.fem as fem
-from newton_cg import newton, solve
+from newton import newton, solve
 from routes_adapter import serve
+from scipy.sparse import bsr_matrix
 
 wp.set_device("cpu")
-real = wp.float64
+real, vec, Reals, Ints = wp.float64, wp.vec3d, wp.array(dtype=wp.float64), wp.array(dtype=int)
 
 
 @fem.integrand
-def work(s: fem.Sample, u: fem.Field, v: fem.Field, E: wp.array(dtype=real), modulus: wp.array(dtype=int), nu: real):
+def R(s: fem.Sample, u: fem.Field, v: fem.Field, E: Reals, modulus: Ints, mu: real, lam: real):
     F = wp.identity(n=3, dtype=real) + fem.grad(u, s)
-    mu = E[modulus[s.element_index]] / (real(2.0) * (real(1.0) + nu))
-    lam = real(2.0) * mu * nu / (real(1.0) - real(2.0) * nu)
     P = mu * F + (lam * wp.log(wp.determinant(F)) - mu) * wp.transpose(wp.inverse(F))
-    return wp.ddot(P, fem.grad(v, s))
+    return E[modulus[s.element_index]] * wp.ddot(P, fem.grad(v, s))
+
+
+@fem.integrand
+def R_u(s: fem.Sample, u: fem.Field, du: fem.Field, v: fem.Field, E: Reals, modulus: Ints, mu: real, lam: real):
+    H, B = fem.grad(du, s), wp.transpose(wp.inverse(wp.identity(n=3, dtype=real) + fem.grad(u, s)))
+    dP = mu * H + (mu + lam * wp.log(wp.determinant(B))) * B * wp.transpose(H) * B + lam * wp.ddot(B, H) * B
+    return E[modulus[s.element_index]] * wp.ddot(dP, fem.grad(v, s))
 
 
 class Block:
     def load(self, case):
-        mesh = fem.Hexmesh(wp.array(case["cells"], dtype=int), wp.array(case["points"], dtype=wp.vec3d))
-        space = fem.make_polynomial_space(mesh, dtype=wp.vec3d)
-        self.case, self.fields = case, {"u": space.make_field(), "v": fem.make_test(space)}
-        self.u, self.R = self.fields["u"].dof_values, wp.zeros(len(case["points"]), dtype=wp.vec3d, requires_grad=True)
-        self.u.requires_grad, self.free = True, np.ones_like(case["points"])
-        self.free[case["clamped"]] = 0.0
-        self.values = {"modulus": wp.array(case["modulus"], dtype=int), "nu": case["nu"]}
+        X, cells, nu, self.case = case["points"], case["cells"], case["nu"], case
+        space = fem.make_polynomial_space(fem.Hexmesh(wp.array(cells, dtype=int), wp.array(X, dtype=vec)), dtype=vec)
+        self.forces, self.free = wp.zeros(len(X), dtype=vec, requires_grad=True), np.full(X.shape, True)
+        self.fields, self.du = {"u": space.make_field(), "v": fem.make_test(space)}, {"du": fem.make_trial(space)}
+        self.values = {"mu": 0.5 / (1 + nu), "lam": nu / ((1 + nu) * (1 - 2 * nu))}
+        self.values["modulus"], self.free[case["clamped"]] = wp.array(case["modulus"], dtype=int), False
 
-    def residual(self, u):
-        self.u.assign(u)
+    def R(self, u):
+        self.fields["u"].dof_values = wp.array(u, dtype=vec)
         with wp.Tape() as self.tape:
-            fem.integrate(work, fields=self.fields, values=self.values, output=self.R)
-        return self.free * (self.R.numpy() - self.case["forces"])
+            fem.integrate(R, fields=self.fields, values=self.values, output=self.forces)
+        return self.forces.numpy() - self.case["forces"]
 
-    def pull_back(self, v):
-        self.tape.zero()
-        self.tape.backward(grads={self.R: wp.array(v, dtype=wp.vec3d)})
-        return self.free * self.u.grad.numpy()
+    def R_u(self):
+        K = fem.integrate(R_u, fields=self.fields | self.du, values=self.values)
+        n = K.nnz_sync()
+        return bsr_matrix((K.values.numpy()[:n], K.columns.numpy()[:n], K.offsets.numpy()))
 
-    def value(self, p):
-        return self.gradient(p)["J"]
+    def value(self, p, rtol=1e-12):
+        return self.gradient(p, rtol)["J"]
 
-    def gradient(self, p, rtol=1e-12, adjoint_rtol=1e-12, options=None):
+    def gradient(self, p, rtol, adjoint_rtol=None, options=None):
         E, dE = (np.exp(p), np.exp(p)) if self.case["parametrization"] == "log" else (p, 1.0)
-        self.values["E"], J_u = wp.array(E, requires_grad=True), np.zeros_like(self.free)
-        u = newton(self.residual, self.pull_back, np.zeros_like(self.free), rtol)
-        J_u[self.case["sensors"]] = u[self.case["sensors"]] - self.case["data"]
-        self.pull_back(solve(self.pull_back, -self.free * J_u, adjoint_rtol))
-        return {"J": 0.5 * (J_u**2).sum(), "gradient": self.values["E"].grad.numpy() * dE}
+        self.values["E"], J_u, at = wp.array(E, requires_grad=True), np.zeros(self.free.shape), self.case["sensors"]
+        J_u[at] = newton(self.R, self.R_u, self.free, rtol)[at] - self.case["data"]
+        self.tape.backward(grads={self.forces: wp.array(solve(self.R_u(), -J_u, self.free), dtype=vec)})
+        return {"J": 0.5 * (J_u**2).sum(), "gradient": dE * self.values["E"].grad.numpy()}
 
 
-serve(Block(), "warp", versions=["warp-lang", "scipy"])
+serve(Block(), "warp", versions=["warp-lang", "scipy"], tighten=True)
