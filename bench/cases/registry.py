@@ -150,6 +150,7 @@ ORDER = (
     "warp",
     "warp-unrolled",
     "taichi",
+    "dolfinx",
     "run",
     "scaling",
     "vcurve",
