@@ -22,7 +22,7 @@ _OUT = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)  # frameworks print while they are imported, and from C
 _IN = sys.stdin.buffer
 
-import numpy as np  # noqa: E402
+import numpy as np
 
 PROTOCOL, FRAMED = 1, 65_536
 MEASURED = 2  # calls of `gradient` whose memory is measured, which takes 0.1 ms: one compiles, the next does not
@@ -51,8 +51,16 @@ class Unsupported(Refusal):
     kind = "unsupported"
 
 
-def serve(adapter, name, versions=(), **about):
-    """Answers until `bye` or the end of input. `about`: more of what `describe` says."""
+KINDS = {MemoryError: "memory", np.linalg.LinAlgError: "singular"}
+
+
+def serve(adapter, name, versions=(), kinds=None, **about):
+    """Answers until `bye` or the end of input.
+
+    kinds: of the errors that a framework raises, {AssertionError: "not-converged"}. `about`: more of what `describe`
+    says.
+    """
+    kinds = {**KINDS, **(kinds or {})}
     while True:
         line = _IN.readline()
         if not line:
@@ -71,7 +79,8 @@ def serve(adapter, name, versions=(), **about):
                 said = getattr(adapter, method)(**arguments)
             _send({"id": asked["id"], "result": said if isinstance(said, dict) else {"J": said}})
         except Exception as error:
-            kind = "memory" if isinstance(error, MemoryError) else getattr(error, "kind", "bug")
+            known = next((kinds[each] for each in kinds if isinstance(error, each)), "bug")
+            kind = getattr(error, "kind", known)
             if kind == "bug":
                 traceback.print_exc()
             message = str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"

@@ -151,6 +151,7 @@ ORDER = (
     "warp-unrolled",
     "taichi",
     "dolfinx",
+    "jax-fem",
     "run",
     "scaling",
     "vcurve",
