@@ -152,6 +152,8 @@ ORDER = (
     "taichi",
     "dolfinx",
     "jax-fem",
+    "feax",
+    "dolfinx-adjoint",
     "run",
     "scaling",
     "vcurve",

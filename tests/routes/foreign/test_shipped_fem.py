@@ -16,7 +16,7 @@ from gradient_routes.routes.foreign.manifest import manifest, shipped
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 
-NAMES = ("dolfinx", "jax-fem")
+NAMES = ("dolfinx", "jax-fem", "feax", "dolfinx-adjoint")
 TIGHT = Solver(rtol=1e-13, adjoint_rtol=1e-13)
 
 
