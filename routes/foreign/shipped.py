@@ -1,22 +1,15 @@
-"""The adapters of this package as routes, one a line."""
+"""The adapters of this package as routes: `torch_fem` is that of adapters/torch-fem.py."""
+
+from functools import cache
 
 from gradient_routes.routes.foreign.foreign import of_manifest
 from gradient_routes.routes.foreign.manifest import ADAPTERS, manifest
 from gradient_routes.routes.route import Route
 
 
-def _route(name: str) -> Route:
-    return of_manifest(manifest(ADAPTERS / f"{name}.py"))
-
-
-jax = _route("jax")
-lineax = _route("lineax")
-taichi = _route("taichi")
-torch = _route("torch")
-torch_fem = _route("torch-fem")
-warp = _route("warp")
-warp_unrolled = _route("warp-unrolled")
-dolfinx = _route("dolfinx")
-jax_fem = _route("jax-fem")
-feax = _route("feax")
-dolfinx_adjoint = _route("dolfinx-adjoint")
+@cache
+def __getattr__(name: str) -> Route:
+    script = ADAPTERS / f"{name.replace('_', '-')}.py"
+    if not script.is_file():
+        raise AttributeError(f"no adapter {script.stem}")
+    return of_manifest(manifest(script))
