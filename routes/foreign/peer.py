@@ -26,7 +26,7 @@ from gradient_routes.routes.foreign.protocol import VERSION, Ended, NoMessage, r
 
 NAME = 80  # characters of a name, a version, a wrong value
 GRACE_S = 5.0  # for an adapter to end by itself
-FORCED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")  # of our process, to which a peer is not bound
+FORCED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE", "XLA_FLAGS")  # of our process, to which a peer is not bound
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NPROC")
 
 
