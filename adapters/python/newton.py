@@ -1,7 +1,7 @@
 """Newton's method for frameworks that give R and R_u, a sparse matrix, but no solver; R and u have one shape."""
 
 import numpy as np
-from routes_adapter import NotConverged
+from routes_adapter import NotConverged, Singular
 from scipy.sparse.linalg import splu
 
 STEPS = 20
@@ -10,7 +10,10 @@ STEPS = 20
 def solve(R_u, b, free):
     """R_u^-1 b among the components `free`, a mask of the shape of b; 0 elsewhere."""
     x, inside = np.zeros_like(b), free.ravel()
-    x[free] = splu(R_u.tocsc()[:, inside][inside]).solve(b[free])
+    try:
+        x[free] = splu(R_u.tocsc()[:, inside][inside]).solve(b[free])
+    except RuntimeError as error:
+        raise Singular(error) from None
     return x
 
 
@@ -19,9 +22,12 @@ def newton(residual, tangent, free, rtol):
     u = np.zeros(free.shape)
     R = residual(u)
     wanted = rtol * abs(R[free]).max()
-    for _ in range(STEPS):
-        if abs(R[free]).max() <= wanted:
+    for step in range(STEPS):
+        size = abs(R[free]).max()
+        if size <= wanted:
             return u
+        if not np.isfinite(size):
+            raise NotConverged(f"Newton's method: |R| = {size} after {step} steps, which are not damped")
         u = u - solve(tangent(), R, free)
         R = residual(u)
     raise NotConverged(f"Newton's method: |R| = {abs(R[free]).max():.1e} after {STEPS} steps, wanted {wanted:.1e}")

@@ -12,6 +12,7 @@ from conftest import relative_error, somewhere
 from gradient_routes.bench.cases.registry import entries
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
+from gradient_routes.problems.errors import NotConverged
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.foreign.foreign import of_manifest
 from gradient_routes.routes.foreign.manifest import Manifest, manifest, shipped
@@ -36,10 +37,14 @@ def cases() -> Iterator[Any]:
                 yield pytest.param(found, kind, parametrization, options, id=label)
 
 
-@pytest.mark.parametrize(("found", "kind", "parametrization", "options"), list(cases()))
-def test_the_gradient_is_ours(found: Manifest, kind: str, parametrization: str, options: dict[str, str]) -> None:
+def skip_without_environment(found: Manifest) -> None:
     if not found.ready:
         pytest.skip(f"{found.name} has no environment here: routes environments create {found.name}")
+
+
+@pytest.mark.parametrize(("found", "kind", "parametrization", "options"), list(cases()))
+def test_the_gradient_is_ours(found: Manifest, kind: str, parametrization: str, options: dict[str, str]) -> None:
+    skip_without_environment(found)
     problem, solver = PROBLEMS[kind](parametrization=parametrization), TIGHT[kind]
     p = somewhere(problem)
     J, expected, *_ = adjoint.prepare(Model(problem, solver), p)(p)
@@ -54,3 +59,12 @@ def test_an_adapter_is_a_route_and_short(name: str) -> None:
     assert entries("route")[name].failure is None
     code = MANIFESTS[name].script.read_text().split('"""', 2)[2].splitlines()
     assert len([line for line in code if line.strip() and not line.lstrip().startswith("#")]) <= 45
+
+
+@pytest.mark.parametrize("name", ["torch-fem", "warp"])
+def test_a_solve_that_fails_says_so(name: str) -> None:
+    skip_without_environment(MANIFESTS[name])
+    problem = Block(n=2)
+    soft = problem.parameters.start - 12.0  # under a load far beyond what Newton's method can take
+    with pytest.raises(NotConverged, match=name):
+        of_manifest(MANIFESTS[name]).prepare(Model(problem, Solver()), soft)(soft)
