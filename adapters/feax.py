@@ -15,6 +15,7 @@ from routes_adapter import serve
 import feax as fe
 import jax
 import jax.numpy as jnp
+from feax.solvers.newton import NewtonLineSearchError
 
 
 class Solid(fe.Problem):
@@ -65,4 +66,4 @@ class Block:
         return {"J": J, "gradient": g, "forward_s": solved - start, "backward_s": perf_counter() - solved}
 
 
-serve(Block(), "feax", versions=["feax", "jax"], kinds={RuntimeError: "not-converged"})
+serve(Block(), "feax", versions=["feax", "jax"], kinds={NewtonLineSearchError: "not-converged"})
