@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import ROOT
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
@@ -94,6 +94,7 @@ def test_the_guide_shows_how_a_case_is_refused(heard: list[tuple[str, Any]]) -> 
         same(said, shown)
 
 
+@settings(deadline=None)  # the machine may be busy
 @given(
     st.sampled_from([np.float64, np.int64]).flatmap(
         lambda kind: arrays(kind, array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=5))
