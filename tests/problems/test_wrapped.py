@@ -27,6 +27,7 @@ CHANGED = {
     *(
         "parameters",
         "typical",
+        "case",
         "linearize",
         "traced",
         "reference",
