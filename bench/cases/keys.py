@@ -7,7 +7,7 @@ import json
 import platform
 from contextlib import suppress
 from dataclasses import asdict
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +60,16 @@ def content_key_of(case_key: str, code: list[Source], run: list[Path], problem_o
     """The same, of what a row holds: files are read, nothing is run."""
     read = [*case.files([problem_options], at), *run]
     data = [hashlib.sha256(located(file).read_bytes()).hexdigest() for file in read]
-    digests = [digest(each) for each in code]
-    return hashed(case_key, digests, data, versions(), platform.python_version(), HARNESS)
+    rest = _rest(tuple(map(digest, code)), tuple(data), tuple(versions().items()), platform.python_version(), HARNESS)
+    return _short(f"[{json.dumps(case_key)}, {rest[1:]}")
+
+
+@lru_cache
+def _rest(
+    digests: tuple[str, ...], data: tuple[str, ...], libraries: tuple[tuple[str, Any], ...], python: str, harness: Any
+) -> str:
+    """What many cases rest on alike."""
+    return _plain(digests, data, dict(libraries), python, harness)
 
 
 def programs(route: str, options: Row) -> list[Path]:
@@ -92,4 +100,12 @@ def witnesses(problem: case.ProblemSpec, route: case.RouteSpec, at: str) -> tupl
 
 def hashed(*parts: Any) -> str:
     """16 digits of a hash of plain values."""
-    return hashlib.sha256(json.dumps(clean(list(parts)), sort_keys=True).encode()).hexdigest()[:16]
+    return _short(_plain(*parts))
+
+
+def _plain(*parts: Any) -> str:
+    return json.dumps(clean(list(parts)), sort_keys=True)
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

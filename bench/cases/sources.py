@@ -35,9 +35,15 @@ def source(target: Any) -> Source:
     function = target.function if isinstance(target, Route) else target
     module = sys.modules.get(getattr(function, "__module__", None) or "")
     name, file = getattr(module, "__name__", ""), getattr(module, "__file__", None)
+    return _source(name, file, getattr(function, "__qualname__", ""))
+
+
+@cache
+def _source(module: str, file: str | None, function: str) -> Source:
+    """Places are few, the rows that ask for them many."""
     if file is None or not Path(file).is_file():
-        return Source(None, f"{name}.{getattr(function, '__qualname__', '')}")
-    return Source(str(Path(file).absolute()), name)
+        return Source(None, f"{module}.{function}")
+    return Source(str(Path(file).absolute()), module)
 
 
 def digest(source: Source) -> str:

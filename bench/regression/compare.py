@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 from gradient_routes.bench.cases.declared import undeclared
 from gradient_routes.bench.cases.expected import Expectation, judged
@@ -33,18 +33,19 @@ class Comparison:
     notes: tuple[str, ...]
 
     def count(self, judgement: Judgement) -> int:
-        return sum(finding.judgement == judgement for finding in self.findings)
+        return self.counts[judgement]
 
-    @property
+    @cached_property
     def counts(self) -> dict[Judgement, int]:
-        return {judgement: self.count(judgement) for judgement in JUDGEMENTS}
+        found = Counter(finding.judgement for finding in self.findings)
+        return {judgement: found[judgement] for judgement in JUDGEMENTS}
 
-    @property
+    @cached_property
     def cases(self) -> int:
         """Number of cases of both sides."""
         return sum(finding.metric == "status" for finding in self.findings)
 
-    @property
+    @cached_property
     def by_numbers(self) -> int:
         """Number of cases that are ok on both sides, so that numbers are compared."""
         return sum(f.metric == "status" and f.base == f.new == "ok" for f in self.findings)
@@ -52,11 +53,11 @@ class Comparison:
     @property
     def by_status(self) -> int:
         """Number of other cases of both sides, of which only the status is compared."""
-        return sum(f.metric == "status" for f in self.findings) - self.by_numbers
+        return self.cases - self.by_numbers
 
     @property
     def worse(self) -> bool:
-        return _any_worse(self.findings)
+        return self.counts["worse"] > 0
 
 
 def compare(

@@ -59,9 +59,8 @@ def numbered(store: Store, ids: Sequence[int], names: Sequence[str] = EVERY) -> 
 def _selected(store: Store, names: Sequence[str], ids: Collection[int] | None, parse: bool) -> Iterator[Row]:
     plain = [name for name in names if name not in PREFIX]
     counted = [name for name in names if name in PREFIX]
-    stored = ["case_id", *plain, *(f"{PREFIX[name]}_{kind}" for name in counted for kind in KINDS)]
+    stored = ["case_id", *names, *(f"{PREFIX[name]}_{kind}" for name in counted for kind in KINDS)]
     parsed = [name for name in plain if parse and name in JSON]
-    blank = dict.fromkeys(names)  # rows have their columns in this order
     with store.reading() as db:
         there = {column[1] for column in db.execute("PRAGMA table_info(cases)")}
         columns = ", ".join(f'"{name}"' if name in there else f"NULL AS {name}" for name in stored)
@@ -70,11 +69,11 @@ def _selected(store: Store, names: Sequence[str], ids: Collection[int] | None, p
         if ids is not None:
             which = f"WHERE rowid IN ({', '.join('?' * len(ids))})"
         for values in db.execute(f"SELECT {columns} FROM cases {which}", [*(ids or ())]):
-            row = blank | dict(zip(plain, values[1:], strict=False))
+            row = dict(zip(names, values[1:], strict=False))
             for name in parsed:
                 row[name] = _parsed(store, values[0], name, row[name])
             for k, name in enumerate(counted):
-                first = 1 + len(plain) + k * len(KINDS)
+                first = 1 + len(names) + k * len(KINDS)
                 row[name] = _work(values[first : first + len(KINDS)])
             yield row
 

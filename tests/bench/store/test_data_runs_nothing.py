@@ -82,7 +82,9 @@ def reading(folder: Path) -> list[list[str]]:
             words += ["--problem", "bar", "--no-isolate"] + ["--route", "adjoint", "--no-timing"] * ("timed" in options)
             resumed += [[*words, "--resume"]] if "resume" in options else []
             continue
-        assert "store" in options or files or name in ("list", "environments"), f"{name}: say here how it is called on a store"
+        assert "store" in options or files or name in ("list", "environments"), (
+            f"{name}: say here how it is called on a store"
+        )
         if name == "merge":  # into another one
             words += ["--store", "merged.sqlite"]
         found.append(words)
