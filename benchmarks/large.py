@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +40,12 @@ class Cost:
 
 
 def reading(folder: Path, cases: int = CASES) -> list[Cost]:
-    """Each verb on such a store, in a process of its own."""
-    fill(Store(folder / "a.sqlite"), cases)
+    """Each verb on such a store, in a process of its own. Linux counts what its parent holds as its peak, too: the
+    store is filled elsewhere.
+    """
+    filling = get_context("spawn").Process(target=fill, args=(Store(folder / "a.sqlite"), cases))
+    filling.start()
+    filling.join()
     shutil.copy(folder / "a.sqlite", folder / "b.sqlite")
     return [measured(folder, verb) for verb in VERBS]
 
@@ -69,14 +74,13 @@ def growth(rows: int = CASES, early: int = 5000) -> int:
 
 def main() -> None:
     out = console()
-    grown = growth()
-    out.print(f"{CASES} rows taken by a run: {size(grown)} more than after 5000 (<= {size(ALLOWED_GROWTH)})")
     with tempfile.TemporaryDirectory() as folder:
         for cost in reading(Path(folder)):
             out.print(
                 f"{cost.command} of {CASES} cases: {duration(cost.seconds)} (<= {ALLOWED_S:g} s), {size(cost.peak)}"
                 f" (<= {size(ALLOWED_BYTES)})"
             )
+    out.print(f"{CASES} rows taken by a run: {size(growth())} more than after 5000 (<= {size(ALLOWED_GROWTH)})")
 
 
 if __name__ == "__main__":

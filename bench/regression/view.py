@@ -63,14 +63,16 @@ def _table(cases: Sequence[tuple[str, str, dict[str, Finding]]]) -> TextTable:
 
 def overview(comparison: Comparison) -> list[tuple[str, str, dict[str, Finding]]]:
     """Problem, route and findings by metric of every case of both sides; of many, first those that changed."""
-    grouped: defaultdict[int, dict[str, Finding]] = defaultdict(dict)
-    for finding in comparison.findings:
-        if finding.metric in METRICS:
+    shown = [finding for finding in comparison.findings if finding.metric in METRICS]
+    cases = [*dict.fromkeys(id(finding.case) for finding in shown)]
+    if len(cases) > MOST:
+        first = {id(finding.case) for finding in shown if changed(finding)}
+        cases = sorted(cases, key=lambda case: case not in first)[:MOST]
+    grouped: dict[int, dict[str, Finding]] = {case: {} for case in cases}
+    for finding in shown:
+        if id(finding.case) in grouped:
             grouped[id(finding.case)][finding.metric] = finding
-    shown = [*grouped.values()]
-    if len(shown) > MOST:
-        shown = sorted(shown, key=lambda by_metric: not any(map(changed, by_metric.values())))[:MOST]
-    return [(*names(next(iter(by_metric.values())).case), by_metric) for by_metric in shown]
+    return [(*names(next(iter(by_metric.values())).case), by_metric) for by_metric in grouped.values()]
 
 
 def changed(finding: Finding) -> bool:
