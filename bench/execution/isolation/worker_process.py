@@ -15,7 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 from typing import Any
 
 from gradient_routes.bench.cases.declared import is_foreign
@@ -74,7 +74,8 @@ class WorkerProcess:
         with suppress(OSError):  # it has ended: hear() reports that
             self.connection.send((limits, os.getpid(), sys.path))
             self.connection.send(job)
-        self._heard: SimpleQueue[Any] = SimpleQueue()
+        # no SimpleQueue: its get(timeout) waits for ever where a signal's handler runs beyond the timeout
+        self._heard: Queue[Any] = Queue()
         self._message: Any = None
         self._ended: Ended | None = None
         self._listening = threading.Thread(target=self._listen, daemon=True)

@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
+from functools import partial
 
 import psutil
 import pytest
@@ -21,6 +24,7 @@ from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
 from gradient_routes.bench.execution.isolation.run import here, stream
 from gradient_routes.bench.execution.isolation.signals import interruptible
+from gradient_routes.bench.execution.isolation.worker_process import WorkerProcess
 from gradient_routes.problems.errors import InputError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes with limits")
@@ -214,3 +218,28 @@ def test_a_closed_stream_leaves_no_process() -> None:
     assert children() - before
     messages.close()
     assert not children() - before
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="signals to threads are POSIX")
+def test_a_signal_handler_that_outlasts_a_look_does_not_end_the_looking() -> None:
+    """An interrupt that is handled meanwhile is heard at the next look. The job says something long afterwards."""
+    handled: list[int] = []
+
+    def handle(number: int, frame: object) -> None:
+        time.sleep(2.0 * watching.TICK)
+        handled.append(number)
+
+    def look() -> None:
+        if handled:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGUSR1, handle)
+    job = Call(time.sleep, (20.0,))
+    try:
+        with closing(WorkerProcess(job, Limits())) as worker:
+            send = partial(signal.pthread_kill, threading.main_thread().ident, signal.SIGUSR1)
+            threading.Timer(0.5 * watching.TICK, send).start()
+            with pytest.raises(KeyboardInterrupt):
+                worker.hear(look)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
