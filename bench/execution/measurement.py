@@ -167,7 +167,7 @@ def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[
         record.note(f"{route.name}: {why}")
     if status is not Status.OTHER_FUNCTIONAL:
         _judge(context, route, record, np.asarray(result.gradient))
-    _estimate(context, route, record, result)
+        _estimate(context, route, record, result)
     begin("the counting of its work")
     again_s = _count(context, route, options, lambda: gradient(p), model, record)
     rounds = Rounds(lambda: gradient(p), context.forward(), min(first_s, again_s), context.settings.min_time)
@@ -296,7 +296,8 @@ def _judge(context: CaseContext, route: Route, record: Record, g: Array) -> None
     error, reference = judge.error(g)
     record.add({"gradient_error": error, "reference": reference})
     if _converged(context, record) and error > WRONG:
-        record.note(f"{route.name}: the state has converged, yet the gradient is wrong: do not use it")
+        solved = "the state has converged" if record.known["peer"] is None else "its J is ours"
+        record.note(f"{route.name}: {solved}, yet the gradient is wrong: do not use it")
 
 
 def _estimate(context: CaseContext, route: Route, record: Record, result: Result) -> None:
@@ -310,8 +311,11 @@ def _estimate(context: CaseContext, route: Route, record: Record, result: Result
 
 
 def _converged(context: CaseContext, record: Record) -> bool:
+    """Whether the gradient belongs to a solved state: of another code that tells no residual, its J is ours."""
     residual = record.known["residual"]
-    return residual is not None and residual <= min(10.0 * context.settings.solver.rtol, SMALL)
+    if residual is None:
+        return record.known["peer"] is not None
+    return bool(residual <= min(10.0 * context.settings.solver.rtol, SMALL))
 
 
 def _count(

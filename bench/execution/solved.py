@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 
 import numpy as np
@@ -14,7 +15,7 @@ from gradient_routes.routes.newton import ROUNDING, State, norm
 from gradient_routes.routes.route import Result, Route
 
 APART = 10.0  # Newton corrections: two states further apart are not approximations of one
-SAME_J = 1e-3  # of the terms of J: more than the default tolerances of other codes leave in it
+LOOSE = 1e-5  # of |u|: more than default tolerances of other codes leave in their states
 SAME = 1e-8  # of |u|: nearer than that they are, whatever the corrections say
 
 
@@ -38,11 +39,15 @@ def unsolved(context: CaseContext, route: Route, result: Result) -> str | None:
 
 
 def other_functional(context: CaseContext, route: Route, result: Result) -> str | None:
-    """That the J of another code is not ours, with both; None where it is, up to what a loose solve leaves in it."""
+    """That the J of another code is not ours, with both; None where it is, up to what a loose solve leaves in it.
+
+    A state off by delta |u| changes J = 1/2 |r|^2 by |r| delta |u| + delta^2 |u|^2 / 2, of which the terms tell |u|.
+    """
     if result.peer is None or result.J is None:
         return None
     ours, terms = context.objective(), context.judges.terms
-    if abs(result.J - ours) <= SAME_J * terms:
+    delta = max(LOOSE, APART * context.settings.solver.rtol)
+    if abs(result.J - ours) <= 2.0 * delta * math.sqrt(abs(ours) * terms) + delta**2 * terms:
         return None
     return f"{route.name}: its J is {result.J:.9g}, ours {ours:.9g} - compare the signs of its loads first"
 

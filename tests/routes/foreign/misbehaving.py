@@ -54,6 +54,8 @@ def gradient(number, n):
         result["gradient"] = {"float64": [n], "base64": "*"}
     elif KIND == "nan":
         result["gradient"] = array([1.0] * (n - 1) + [float("nan")])
+    elif KIND in ("nearly-J", "wrong"):  # the J of the bar, nearly or quite, and no gradient of it
+        result["J"] = 0.00878072611104688 * (1.005 if KIND == "nearly-J" else 1.0)
     elif KIND == "infinite-J":
         result["J"] = float("inf")
     elif KIND == "endless-J":

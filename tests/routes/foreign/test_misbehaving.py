@@ -46,6 +46,7 @@ ROWS = {
     "bug": ("failed", "gradient(): as it is told"),
     "no-such-case": ("skipped", "load(): it knows no bar"),
     "another-J": ("other-functional", "its J is 1, ours 0.00878"),
+    "nearly-J": ("other-functional", "its J is 0.00882"),
 }
 
 
@@ -96,6 +97,13 @@ def test_none_of_their_processes_is_left(rows: dict) -> None:
 def test_what_another_code_says_of_itself_is_kept(rows: dict) -> None:
     assert rows["another-J"]["peer"] == {"name": "another-J", "versions": {"it": "[1, 2]"}}
     assert rows["another-J"]["memory_method"] == "by another-J itself"
+
+
+def test_a_gradient_that_is_wrong_for_our_J_is_warned_of(cli) -> None:
+    ran = cli(*"run --problem bar --no-store --json --no-timing --route".split(), route("wrong"))
+    (row,) = ran.rows
+    assert row["gradient_error"] > 1.0
+    assert "adapter: its J is ours, yet the gradient is wrong: do not use it" in row["note"]
 
 
 def test_one_that_hangs_is_ended_at_the_limit_with_its_process(cli) -> None:
