@@ -3,8 +3,8 @@
     python -m benchmarks.faults [--faults N] [--seed SEED]
 
 A fault is a signal, a disk that is full or a folder that becomes read-only, at the start of a run, a while after it or
-after one of its rows. Every run goes on with the sweep, one at a time or three at once, and what it kept apart is
-merged before the next. A disk is filled on a tmpfs where one can be mounted; otherwise by the largest size of a file.
+after one of its rows. Every run goes on with the sweep, one at a time or three at once, and with what an earlier one
+kept apart. A disk is filled on a tmpfs where one can be mounted; otherwise by the largest size of a file.
 A folder is made read-only by a mount or, for users who are not root, by its mode.
 """
 
@@ -32,9 +32,9 @@ from pathlib import Path
 import click
 import psutil
 
+from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.render.terminal.tables import console
-from gradient_routes.bench.store.merge import merge
 from gradient_routes.bench.store.store import Store
 
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGINT")
@@ -93,8 +93,13 @@ class Sweep:
         return subprocess.Popen([*command, *named, *way], cwd=self.folder, env=known, text=True,
                                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)  # fmt: skip
 
+    def rows(self) -> list[Row]:
+        """Of the store, and of those apart that a runner was not killed in the writing of."""
+        stores = [self.store, *(Store(path) for path in stores_apart(self) if has_tables(path))]
+        return [row for store in stores for row in store.rows()]
+
     def answers(self) -> Counter[str]:
-        return Counter(row["case_key"] for row in self.store.rows() if row["status"] == "ok")
+        return Counter(row["case_key"] for row in self.rows() if row["status"] == "ok")
 
     def running(self) -> list[psutil.Process]:
         return [process for process in psutil.process_iter() if self._ours(process)]
@@ -118,7 +123,7 @@ def faults(count: int, rng: random.Random, tell: Callable[[str], None] = lambda 
                 if len(at.answers()) == at.cases:
                     break
             found[kind] += struck(at, "", rng)
-            found[kind] += Found(lost=at.cases - len(at.answers()))
+            found[kind] += Found(lost=at.cases - len({row["case_key"] for row in at.store.rows() if row["case_key"]}))
         tell(f"{done} of {count} faults")
     return found
 
@@ -166,8 +171,7 @@ def struck(at: Sweep, kind: str, rng: random.Random) -> Found:
     while (left := len(at.running())) and time.monotonic() < deadline:
         time.sleep(0.1)
     half = unfinished(at)
-    join(at)
-    kept = {(row["case_key"], row["started"]) for row in at.store.rows()}
+    kept = {(row["case_key"], row["started"]) for row in at.rows()}
     rows = [json.loads(line) for line in lines if line.endswith("\n")]
     lost = sum((row["case_key"], row["started"]) not in kept for row in rows)
     repeated = sum(max(0, n - max(1, before[key])) for key, n in at.answers().items())
@@ -251,14 +255,6 @@ def sound(path: Path) -> bool:
 
 def stores_apart(at: Sweep) -> list[Path]:
     return [path for place in (at.folder, at.apart) for path in place.rglob("*unsaved*.sqlite")]
-
-
-def join(at: Sweep) -> None:
-    """What was kept apart is added to the store. A runner that was killed while it wrote one leaves it without rows."""
-    for path in stores_apart(at):
-        if has_tables(path):
-            merge(at.store, Store(path))
-        path.unlink()
 
 
 def has_tables(path: Path) -> bool:

@@ -1,16 +1,21 @@
-"""Rows on their way into a store that may fail: kept in memory, tried again, in the end written to a file apart."""
+"""Rows on their way into a store that may fail: kept in memory, tried again, in the end written to a file apart.
+
+The next `--resume` adds that to the store.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shlex
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import Environment
+from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.samples import Samples
 from gradient_routes.bench.store.store import BESIDE, Store
 from gradient_routes.problems.errors import InputError
@@ -54,23 +59,48 @@ class Keeper:
 
 def apart(store: Store, write: Callable[[Store], object], why: str) -> str:
     """Write what `store` does not take to a store of its own. `why`, where it is now and how it is merged."""
-    for path in _places(store.path):
+    for path in _places(store):
         other = Store(path)
         try:
             write(other)
         except InputError:
             for end in ("", *BESIDE):
                 with suppress(OSError):  # a file system that is read-only says so even of what is not there
-                    path.with_name(path.name + end).unlink()
+                    other.file.with_name(path.name + end).unlink()
         else:
             merge = shlex.join(["routes", "merge", str(path), "--store", str(store.path)])
             return f"{why}; kept in {path} - later: {merge}"
     return f"{why}; nor in any other folder"
 
 
-def _places(path: Path) -> Iterator[Path]:
-    """Files that there are not, beside a store, in the working folder and in that for temporary files."""
-    for folder in dict.fromkeys((path.parent, Path(), Path(tempfile.gettempdir()))):
-        place = folder / f"{path.stem or 'routes'}-unsaved-{os.getpid()}.sqlite"
-        if folder.is_dir() and not place.exists():
+def kept_apart(store: Store) -> list[Path]:
+    """The files of rows and studies that `store` did not take, written by this user."""
+    found = [path for folder in _folders(store) for path in located(folder).glob(f"{_stem(store)}-*.sqlite")]
+    return [path for path in found if _is_own(path)]
+
+
+def _is_own(path: Path) -> bool:
+    """A folder for temporary files is everybody's. What has gone meanwhile is nobody's."""
+    try:
+        return path.lstat().st_uid == os.geteuid()
+    except OSError:
+        return False
+
+
+def _places(store: Store) -> Iterator[Path]:
+    """Files that there are not."""
+    for folder in _folders(store):
+        place = folder / f"{_stem(store)}-{os.getpid()}.sqlite"
+        if located(folder).is_dir() and not located(place).exists():
             yield place
+
+
+def _folders(store: Store) -> Iterable[Path]:
+    """That of a store, the working folder and that for temporary files."""
+    return dict.fromkeys((store.path.parent, Path(), Path(tempfile.gettempdir())))
+
+
+def _stem(store: Store) -> str:
+    """The names of such files begin with it: with the name of the store, and a mark of where it is."""
+    mark = hashlib.sha256(bytes(store.file.resolve())).hexdigest()[:8]
+    return f"{store.path.stem or 'routes'}-unsaved-{mark}"

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Literal
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.samples import Elapsed
+from gradient_routes.bench.store.keeping import kept_apart
+from gradient_routes.bench.store.merge import merge
 from gradient_routes.bench.store.store import Store
+from gradient_routes.problems.errors import InputError
 
 State = Literal["missing", "failed", "stale", "done"]
 OPEN: tuple[State, ...] = ("missing", "failed", "stale")
@@ -39,11 +44,33 @@ def still_open(store: Store, states: tuple[State, ...], expected: Callable[[Row]
     """Whether a case is in one of `states` and no other runner has tried it since: asked when its turn comes."""
     before = store.newest()
 
-    def wanted(row: Row) -> bool:
+    def is_open(row: Row) -> bool:
         kept = store.latest(row["case_key"]).get(row["case_key"])
         if state_of(row, kept, expected) not in states:
             return False
         tried = kept is not None and kept["content_key"] == row["content_key"]
         return not (tried and store.newest(row["case_key"]) > before)
 
+    def wanted(row: Row) -> bool:
+        if not is_open(row) or any(_is_in(Store(path), row) for path in kept_apart(store)):
+            return False
+        return is_open(row)  # another runner may have added it to the store between the two
+
     return wanted
+
+
+def _is_in(apart: Store, row: Row) -> bool:
+    with suppress(InputError):  # it is being written, or has been added to the store since
+        kept = apart.latest(row["case_key"]).get(row["case_key"])
+        return kept is not None and kept["content_key"] == row["content_key"]
+    return False
+
+
+def add_kept_apart(store: Store) -> list[tuple[Path, int, int]]:
+    """Add to a store what earlier runs could not, and delete their files: which, how many cases and studies."""
+    added = []
+    for path in kept_apart(store):
+        with suppress(InputError):  # another run writes it, or has added it
+            added.append((path, *merge(store, Store(path))))
+            path.unlink(missing_ok=True)
+    return added

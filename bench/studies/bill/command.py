@@ -150,9 +150,9 @@ def run(
     settings = Settings(at, budget, min_time, timed, gradient is not None, solver, partial, files.fields, du_dp)
     store = None if kept is None else Store(kept)
     known = _expectations(expected, kept)
-    wanted = _wanted(store, resume, only, known)
     if store is not None:
         store.check_writable()
+    wanted = _wanted(store, resume, only, known)
     claims = None if store is None or wanted is everything else Claims(store)
     outcomes = run_cases(problem_specs, route_specs, settings, how, wanted, claims)
     done = Done(store, as_json, known, views=gradient is not None or files.fields)
@@ -196,12 +196,14 @@ def _wanted(
 ) -> Callable[[Row], bool]:
     from gradient_routes.bench.cases.expected import as_expected
     from gradient_routes.bench.execution.sweep import everything
-    from gradient_routes.bench.store.resume import OPEN, still_open
+    from gradient_routes.bench.store.resume import OPEN, add_kept_apart, still_open
 
     if store is None:
         refuse_given(("resume", "only"), "looks into a store, with --no-store there is none")
     if store is None or only == "all" or not (resume or only):
         return everything
+    for path, cases, studies in add_kept_apart(store):
+        complain(f"{cases} cases and {studies} studies of {path} added to {store.path}")
     return still_open(store, OPEN if only is None else (only,), lambda row: as_expected(row, known))
 
 

@@ -60,13 +60,11 @@ def test_a_damaged_store_is_not_sound(tmp_path: Path) -> None:
     assert not sound(store.path)
 
 
-def test_what_was_kept_apart_is_joined_once(tmp_path: Path) -> None:
+def test_what_was_kept_apart_counts(tmp_path: Path) -> None:
     at = Sweep(tmp_path / "folder", tmp_path / "apart", 4, mounted=False)
     at.store.append(empty_row(), None)
     at.apart.mkdir()
     Store(at.apart / "s-unsaved-1.sqlite").append(empty_row() | {"problem": "bar"}, None)
     with sqlite3.connect(at.folder / "s-unsaved-2.sqlite"):
         pass  # of a runner that was killed while it wrote it
-    faults.join(at)
-    assert [row["problem"] for row in at.store.rows()] == [None, "bar"]
-    assert not faults.stores_apart(at)
+    assert [row["problem"] for row in at.rows()] == [None, "bar"]

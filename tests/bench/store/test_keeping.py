@@ -212,7 +212,7 @@ def test_a_store_that_locks_up_midway_loses_no_row(
 
 def test_a_function_warns_where_its_rows_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Store, "append_all", locked)
-    with pytest.warns(UserWarning, match=r"1 row not kept: .*kept in .*s-unsaved-\d+\.sqlite") as said:
+    with pytest.warns(UserWarning, match=r"1 row not kept: .*kept in .*s-unsaved-\w{8}-\d+\.sqlite") as said:
         frame = run("bar", "adjoint", timing=False, store=tmp_path / "s.sqlite")
     assert said[0].filename == __file__
     assert len(frame) == 1

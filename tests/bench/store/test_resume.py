@@ -17,7 +17,9 @@ from forks import Forks
 from benchmarks.faults import sound
 from gradient_routes.bench.cases import environment, keys, sources
 from gradient_routes.bench.cases.row import STATUSES, empty_row
-from gradient_routes.bench.store.resume import state_of
+from gradient_routes.bench.store import resume
+from gradient_routes.bench.store.keeping import apart, kept_apart
+from gradient_routes.bench.store.resume import OPEN, add_kept_apart, state_of, still_open
 from gradient_routes.bench.store.store import Store
 
 MODEL = '''
@@ -221,12 +223,29 @@ def test_a_full_disk_loses_no_printed_row_and_harms_no_store(plugin: Path, forks
     kept = len(store.rows()) - others
     waiting = len(sizes) - kept
     assert f"{waiting} rows not kept: store" in full.err
-    (apart,) = (plugin / "results").glob("routes-unsaved-*.sqlite")
-    assert [row["n_param"] for row in Store(apart).rows()] == sizes[kept:]
-    merge = full.err.partition("later: ")[2].splitlines()[0]
-    assert shell(merge, plugin).stdout.startswith(f"{waiting} cases and 0 studies")
-    assert forks.run(plugin, *RUN, *sweep).rows == []
+    (path,) = (plugin / "results").glob("routes-unsaved-*.sqlite")
+    assert [row["n_param"] for row in Store(path).rows()] == sizes[kept:]
+    again = forks.run(plugin, *RUN, *sweep)
+    assert (again.rows, path.exists()) == ([], False)
+    assert f"{waiting} cases and 0 studies of {path} added to results/routes.sqlite" in again.err
     assert len(store.rows()) == others + len(sizes)
+
+
+def test_what_another_runner_keeps_apart_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At once, and after a third has added it to the store, between the two looks as well."""
+    done = empty_row() | {"case_key": "1", "content_key": "2", "status": "ok"}
+    store = Store(tmp_path / "s.sqlite")
+    wanted = still_open(store, OPEN, lambda row: False)
+    assert wanted(done)
+    for name in ("t", "s"):  # the first is of another store
+        apart(Store(tmp_path / f"{name}.sqlite"), lambda other: other.append(done, None), "")
+        assert wanted(done) == (name == "t")
+    assert wanted(done | {"content_key": "3"})
+    (path,) = kept_apart(store)
+    path.with_name(path.name + "-2.sqlite").touch()  # of a runner that was killed before it wrote it
+    monkeypatch.setattr(resume, "_is_in", lambda other, row: not add_kept_apart(store) and False)
+    assert not wanted(done)
+    assert (len(store.rows()), path.exists(), len(kept_apart(store))) == (1, False, 1)
 
 
 def test_a_row_of_an_older_schema_is_missing(plugin: Path, forks: Forks) -> None:
