@@ -42,7 +42,7 @@ AREAS = {  # folder -> its tests; those that import the mutated module run first
     "routes": ("tests/routes", "tests/problems"),
     "bench/verification": ("tests/bench/verification", "tests/bench/studies/test_check_cli.py"),
 }
-UNCOPIED = shutil.ignore_patterns(".*", "__pycache__", "results", "build", "dist", "*.egg-info", "docs")
+UNCOPIED = shutil.ignore_patterns(".*", "__pycache__", "results", "build", "dist", "*.egg-info", "_build")
 LEFT_OUT = {"view.py", "page.py", "table.py", "messages.py", "test_mutants.py"}  # words, pictures and ourselves
 SKIPPED = (ast.JoinedStr, ast.Assert, ast.Raise, ast.arg, ast.AnnAssign)  # messages and annotations
 LEFT = (ast.Lt, ast.Gt, ast.Eq, ast.Is, ast.In, ast.Add, ast.Mult, ast.And)
