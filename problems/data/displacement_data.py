@@ -20,7 +20,7 @@ from gradient_routes.problems.problem import Array
 class DisplacementData:
     """S and d of J = 1/2 sum over load cases of |S u - d|^2 [m^2].
 
-    d (cases, m, 3)  [m], None for synthetic data that are not computed yet
+    d (cases, m, d)  [m], None for synthetic data that are not computed yet
     noise            standard deviation of the noise on d [m]
     """
 
@@ -33,7 +33,7 @@ class DisplacementData:
         """d. Raises InputError for synthetic data that are not computed yet."""
         if self.d is None:
             raise InputError(
-                "block: data=twin are not made yet - solve for them:"
+                f"{self.solid.mesh.who}: data=twin are not made yet - solve for them:"
                 " gradient_routes.routes.synthetic_data.with_synthetic_data(block)"
             )
         return self.d
@@ -92,7 +92,7 @@ class DisplacementData:
         return len(self.solid.directions)
 
     def _probe_displacements(self, u: Any, s: Setup, xp: Any = np) -> list[Any]:
-        """Displacements of the probes' nodes, (m, k, 3) per load case."""
+        """Displacements of the probes' nodes, (m, k, d) per load case."""
         return [self.solid.displacements(u, s, case, self.probes.nodes, xp) for case in range(self._cases)]
 
     @cached_property

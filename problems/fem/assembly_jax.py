@@ -25,8 +25,9 @@ CELLS_PER_CHUNK = 128  # their arrays stay in cache
 class JaxAssembly:
     """Element integrals of the energy W(H, q).
 
-    Arguments: u_e (n_e, n_a, 3) displacements of the cells' nodes [m]; q a tuple of material constants, numbers or
-    (n_e,); dN (n_e, n_q, n_a, 3), or (1, n_q, n_a, 3) if the cells are congruent, and dx (n_e, n_q), their metric.
+    Arguments: u_e (n_e, n_a, d) displacements of the cells' nodes [m]; q a tuple of material constants, numbers or
+    (n_e,); dN (n_e, n_q, n_a, m), or (1, n_q, n_a, m) if the cells are congruent, and dx (n_e, n_q), their metric.
+    H is d x m.
     """
 
     def __init__(self, W: Energy) -> None:
@@ -41,7 +42,7 @@ class JaxAssembly:
         return (self._W(displacement_gradients(u_e, dN), _per_cell(q, dx)) * dx).sum()
 
     def _moduli(self, H: Any, q: Any, dx: Any) -> Any:
-        """A_iJjL dx, (n_e, n_q, 3, 3, 3, 3) in the order J i j L."""
+        """A_iJjL dx, (n_e, n_q, m, d, d, m) in the order J i j L."""
         A = self._A(H, _per_cell(q, dx))
         return jnp.swapaxes(A * dx[..., None, None, None, None], 2, 3)
 
@@ -57,12 +58,12 @@ def assembly(W: Energy) -> JaxAssembly:
 
 
 def displacement_gradients(u_e: Any, dN: Any) -> Any:
-    """H = grad u at every point, (n_e, n_q, 3, 3); one matrix product if the cells are congruent."""
-    n_e, n_a, _ = u_e.shape
+    """H = grad u at every point, (n_e, n_q, d, m); one matrix product if the cells are congruent."""
+    n_e, n_a, d = u_e.shape
     if len(dN) > 1:
         return jnp.einsum("eai,eqaj->eqij", u_e, dN)
-    B = jnp.einsum("qaj,ik->akqij", dN[0], jnp.eye(3)).reshape(3 * n_a, -1)
-    return (u_e.reshape(n_e, -1) @ B).reshape(n_e, -1, 3, 3)
+    B = jnp.einsum("qaj,ik->akqij", dN[0], jnp.eye(d)).reshape(d * n_a, -1)
+    return (u_e.reshape(n_e, -1) @ B).reshape(n_e, -1, d, dN.shape[-1])
 
 
 def _per_cell(q: Any, dx: Any) -> Any:
@@ -73,18 +74,18 @@ def _per_cell(q: Any, dx: Any) -> Any:
 def element_matrices(A_dx: Array, dN: Array, selected: Array) -> Array:
     """Entries `pick` (k,), counted row by row, of the matrices sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k).
 
-    A_dx (n_e, n_q, 3, 3, 3, 3) has the index order J i j L: then two matrix products suffice, without transposes.
+    A_dx (n_e, n_q, m, d, d, m) has the index order J i j L: then two matrix products suffice, without transposes.
     """
-    n_e, (_, n_q, n_a, _) = len(A_dx), dN.shape
-    row, column = np.divmod(selected, 3 * n_a)
-    at = (3 * row + column % 3) * n_a + column // 3  # position of (ai)(bj) in a i j b
+    n_e, d, (_, n_q, n_a, m) = len(A_dx), A_dx.shape[3], dN.shape
+    row, column = np.divmod(selected, d * n_a)
+    at = (d * row + column % d) * n_a + column // d  # position of (ai)(bj) in a i j b
     entries = np.empty((n_e, len(selected)), np.result_type(A_dx, dN))
     for first in range(0, n_e, CELLS_PER_CHUNK):
         chunk = slice(first, first + CELLS_PER_CHUNK)
-        G = np.ascontiguousarray((dN[chunk] if len(dN) > 1 else dN).transpose(0, 1, 3, 2))  # (chunk, n_q, 3, n_a)
-        AG = A_dx[chunk].reshape(-1, n_q, 27, 3) @ G  # (chunk, n_q, J i j, b)
-        K = G.reshape(-1, 3 * n_q, n_a).transpose(0, 2, 1) @ AG.reshape(-1, 3 * n_q, 9 * n_a)  # (chunk, a, i j b)
-        np.take(K.reshape(-1, 9 * n_a * n_a), at, axis=1, out=entries[chunk])
+        G = np.ascontiguousarray((dN[chunk] if len(dN) > 1 else dN).transpose(0, 1, 3, 2))  # (chunk, n_q, m, n_a)
+        AG = A_dx[chunk].reshape(-1, n_q, m * d * d, m) @ G  # (chunk, n_q, J i j, b)
+        K = G.reshape(-1, m * n_q, n_a).transpose(0, 2, 1) @ AG.reshape(-1, m * n_q, d * d * n_a)  # (chunk, a, i j b)
+        np.take(K.reshape(-1, d * d * n_a * n_a), at, axis=1, out=entries[chunk])
     return entries
 
 
@@ -155,12 +156,12 @@ def gradient(f: Callable[..., Any], argument: int) -> Callable[..., Any]:
 
 
 def _second_derivative(W: Energy) -> Callable[[Any, Any], Any]:
-    """A(H, q) = d^2 W / dH^2, (3, 3, 3, 3), forward over reverse."""
+    """A(H, q) = d^2 W / dH^2, (d, m, d, m), forward over reverse."""
 
     def A(H: Any, q: Any) -> Any:
         P = gradient(W, 0)
-        directions = jnp.eye(9, dtype=H.dtype).reshape(9, 3, 3)
-        columns = jax.vmap(lambda D: jax.jvp(lambda H: P(H, q), (H,), (D,))[1])(directions)  # (9, 3, 3), by jL
-        return jnp.moveaxis(columns.reshape(3, 3, 3, 3), (0, 1), (2, 3))
+        directions = jnp.eye(H.size, dtype=H.dtype).reshape(-1, *H.shape)
+        columns = jax.vmap(lambda D: jax.jvp(lambda H: P(H, q), (H,), (D,))[1])(directions)  # (d m, d, m), by jL
+        return jnp.moveaxis(columns.reshape(*H.shape, *H.shape), (0, 1), (2, 3))
 
     return A

@@ -70,10 +70,10 @@ class NumpyAssembly:
 
 
 def _element_forces(P: Array, dN: Array, dx: Array) -> Array:
-    """Sum over points of P_iJ dN_a,J dx, (n_e, n_a, 3)."""
-    n, n_q, n_a, _ = dN.shape
-    P_dx = (P * dx[..., None, None]).transpose(0, 1, 3, 2).reshape(len(P), n_q * 3, 3)
-    return np.asarray(dN.transpose(0, 2, 1, 3).reshape(n, n_a, n_q * 3) @ P_dx)
+    """Sum over points of P_iJ dN_a,J dx, (n_e, n_a, d)."""
+    n, n_q, n_a, m = dN.shape
+    P_dx = (P * dx[..., None, None]).transpose(0, 1, 3, 2).reshape(len(P), n_q * m, -1)
+    return np.asarray(dN.transpose(0, 2, 1, 3).reshape(n, n_a, n_q * m) @ P_dx)
 
 
 def _per_point(q: Any, H: Array) -> tuple[Array, ...]:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.mesh import Mesh
+from gradient_routes.problems.fem.elements import Geometry
+from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.problem import Array
 
 
@@ -17,57 +18,63 @@ class BoundaryConditions:
     """Degrees of freedom in one or more load cases; u concatenates those of all cases.
 
     n_free                         degrees of freedom of one case
-    index (cases, n_nodes, 3)      position of a nodal displacement in (u_case, 0, a), a the grip displacement [m]
-    clamped, gripped               node numbers
+    index (cases, n_nodes, d)      position of a nodal displacement in (u_case, 0, a), a the grip displacement [m]
+    held (n_nodes, d)              components that are zero
+    gripped                        node numbers
     """
 
     n_free: int
     index: Array
-    clamped: Array
+    held: Array
     gripped: Array
 
     @classmethod
-    def of(cls, mesh: Mesh, clamped: Array, gripped: Array, directions: Array) -> BoundaryConditions:
-        """From node numbers and the directions (cases, 3) the grip moves in. Raises InputError if no node is free."""
-        X = mesh.geometry.X
-        free = np.zeros(len(X), dtype=bool)
+    def of(cls, mesh: Mesh, held: Array, gripped: Array, directions: Array) -> BoundaryConditions:
+        """From the components that are held, and the directions (cases, d) the grip moves in.
+
+        Raises InputError if no node is free.
+        """
+        free = np.zeros(held.shape, dtype=bool)
         free[np.unique(mesh.geometry.nodes)] = True  # a mesh file may contain nodes of no cell
-        free[clamped] = free[gripped] = False
-        n_free = 3 * int(free.sum())
+        free[held] = free[gripped] = False
+        n_free = int(free.sum())
         if n_free == 0:
             raise InputError(f"{mesh.who}: no node is free to move - refine the mesh or clamp less")
-        index = np.full((len(X), 3), n_free)
-        index[free] = np.arange(n_free).reshape(-1, 3)
+        index = np.full(held.shape, n_free)
+        index[free] = np.arange(n_free)
         cases = np.repeat(index[None], len(directions), axis=0)
         for case, direction in zip(cases, directions, strict=True):
             case[gripped[:, None], np.flatnonzero(direction)] = n_free + 1
-        return cls(n_free, cases, clamped, gripped)
+        return cls(n_free, cases, held, gripped)
+
+    @property
+    def clamped(self) -> Array:
+        """The nodes that are held in any component."""
+        return np.flatnonzero(self.held.any(axis=1))
 
     @property
     def n_u(self) -> int:
         return self.n_free * len(self.index)
 
     def displacements(self, u: Any, a: Any, case: int, nodes: Array, xp: Any) -> Any:
-        """Displacements (..., 3) of nodes in a load case, from u (n_u,) and the grip displacement a."""
+        """Displacements (..., d) of nodes in a load case, from u (n_u,) and the grip displacement a."""
         u_case = u[case * self.n_free : (case + 1) * self.n_free]
         return xp.concatenate([u_case, xp.stack([0.0 * a, a])])[self.index[case][nodes]]
 
     def dofs(self, nodes: Array, case: int = 0) -> Array:
-        """(n_e, 3 n_a), degrees of freedom of the cells within a case, -1 where constrained; the same in all cases."""
+        """(n_e, d n_a), degrees of freedom of the cells within a case, -1 where constrained; the same in all cases."""
         index = self.index[case][nodes].reshape(len(nodes), -1)
         return np.where(index < self.n_free, index, -1)
 
-    def rigid_body_modes(self, X: Array) -> Array:
-        """(n_free, 6), translations along and linearized rotations about the three axes, of nodes at X."""
-        e, r = np.eye(3), X - X.mean(axis=0)
-        motions = [np.broadcast_to(e[i], r.shape) for i in range(3)] + [np.cross(e[i], r) for i in range(3)]
+    def near_nullspace(self, geometry: Geometry) -> Array:
+        """(n_free, k), the rigid-body modes in the free components."""
         free = self.index[0] < self.n_free
-        rigid = np.empty((self.n_free, 6))
-        rigid[self.index[0][free]] = np.stack(motions, axis=-1)[free]
+        rigid = np.empty((self.n_free, rigid_body_modes(geometry).shape[-1]))
+        rigid[self.index[0][free]] = rigid_body_modes(geometry)[free]
         return rigid
 
     def assemble(self, forces: Array, nodes: Array, case: int) -> tuple[Array, Any]:
-        """The transpose of `displacements`: nodal forces (..., 3) summed into (n_free,), and their part on a."""
+        """The transpose of `displacements`: nodal forces (..., d) summed into (n_free,), and their part on a."""
         at, n = self.index[case][nodes].ravel(), self.n_free + 2
         flat = forces.ravel()
         total = np.bincount(at, weights=flat.real, minlength=n)
@@ -76,15 +83,50 @@ class BoundaryConditions:
         return total[: self.n_free], total[-1]
 
 
-def check_clamp(mesh: Mesh, clamped: Array) -> None:
-    """Raises InputError if a connected part of the mesh keeps rigid-body modes: its clamped nodes lie on a line."""
-    parts = mesh.geometry.parts
+def rigid_body_modes(geometry: Geometry) -> Array:
+    """(n_nodes, d, k), translations along and linearized rotations about the axes; of a body of revolution, along y."""
+    e, r = np.eye(3)[:, : geometry.dim], geometry.X - geometry.X.mean(axis=0)
+    if geometry.axisymmetric:
+        return np.broadcast_to(e[1], r.shape)[..., None]
+    turns = [np.cross(e_i, r) for e_i in e] if geometry.dim == 3 else [r[:, ::-1] * [-1.0, 1.0]]
+    motions = [*e[: geometry.dim], *turns]
+    return np.stack([np.broadcast_to(motion, r.shape) for motion in motions], axis=-1)
+
+
+def held_components(mesh: Mesh, clamped: str, fixed: str | None) -> Array:
+    """(n_nodes, d), the components held at zero: all on the face `clamped`, those of `fixed` such as x@left,y@bottom,
+    and the radial one on the axis of a body of revolution.
+
+    Raises InputError for what names no face or component, or leaves a part of the body a rigid motion.
+    """
+    geometry = mesh.geometry
+    held = np.zeros(geometry.X.shape, dtype=bool)
+    if clamped != "none":
+        held[mesh.boundary(clamped).node_set] = True
+    for item in fixed.split(",") if fixed else ():
+        axis, at, face = (part.strip() for part in item.partition("@"))
+        if not at or axis not in [*AXES[: geometry.dim]]:
+            what = f"a component {', '.join(AXES[: geometry.dim])} at a face"
+            raise InputError(f"{mesh.who}: fixed={fixed}: '{item}' is not {what} - write x@left,y@bottom")
+        held[mesh.boundary(face).node_set, AXES.index(axis)] = True
+    if geometry.axisymmetric:
+        held[np.abs(geometry.X[:, 0]) <= 1e-9 * mesh.diameter, 0] = True
+    _check_held(mesh, held)
+    return held
+
+
+def _check_held(mesh: Mesh, held: Array) -> None:
+    """Raises InputError if a connected part of the mesh keeps rigid-body modes: those of its held components have not
+    full rank.
+    """
+    geometry, parts = mesh.geometry, mesh.geometry.parts
+    modes = rigid_body_modes(geometry)
+    modes = modes / np.abs(modes).max(axis=(0, 1))
     for part in range(parts.max() + 1):
-        held = clamped[parts[clamped] == part]
-        X = mesh.geometry.X[held]
-        spread = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) if len(X) else np.zeros(3)
-        if (spread > 1e-9 * mesh.diameter).sum() < 2:
+        in_part = held & (parts == part)[:, None]
+        if np.linalg.matrix_rank(modes[in_part], tol=1e-9) < modes.shape[-1]:
             what = "the body" if parts.max() == 0 else f"part {part + 1} of {parts.max() + 1} that share no node"
+            count = int(in_part.any(axis=1).sum())
             raise InputError(
-                f"{mesh.who}: {len(held)} clamped nodes leave {what} free to turn: R_u is singular - clamp a face"
+                f"{mesh.who}: {count} clamped nodes leave {what} free to move or turn: R_u is singular - clamp a face"
             )

@@ -15,20 +15,39 @@ import numpy as np
 
 from gradient_routes.problems.problem import Array
 
-ElementName = Literal["hex8", "tet4", "tet10"]
-QUADRATURE = {"hex8": (2, 2), "tet4": (1, 2), "tet10": (2, 4)}  # polynomial orders inside and on facets
+SolidElement = Literal["hex8", "tet4", "tet10"]
+PlaneElement = Literal["quad4", "quad8", "tri3", "tri6"]
+ElementName = SolidElement | PlaneElement
+# scikit-fem's shape functions, those that map the reference facet to the sides, polynomial orders inside and on facets
+ELEMENTS: dict[ElementName, tuple[str, str, tuple[int, int]]] = {
+    "hex8": ("ElementHex1", "ElementQuad1", (2, 2)),
+    "tet4": ("ElementTetP1", "ElementTriP1", (1, 2)),
+    "tet10": ("ElementTetP2", "ElementTriP1", (2, 4)),
+    "quad4": ("ElementQuad1", "ElementLineP1", (2, 2)),
+    "quad8": ("ElementQuadS2", "ElementLineP1", (4, 4)),
+    "tri3": ("ElementTriP1", "ElementLineP1", (1, 2)),
+    "tri6": ("ElementTriP2", "ElementLineP1", (2, 4)),
+}
+BRICKS = ("hex8", "quad4", "quad8")  # their reference element is the unit cube or square, else a simplex
 NEWTON_TOLERANCE = 1e-12  # of a Newton step in reference coordinates
 CONGRUENCE_TOLERANCE = 1e-13  # relative difference of shape function gradients that is attributed to rounding
 # meshio's name and node order, for cells with det J > 0 and det J < 0 in scikit-fem's order
-MESHIO = {
+MESHIO: dict[ElementName, tuple[str, list[int], list[int]]] = {
     "hex8": ("hexahedron", [0, 2, 6, 3, 1, 4, 7, 5], [0, 3, 6, 2, 1, 5, 7, 4]),
     "tet4": ("tetra", [0, 1, 2, 3], [1, 0, 2, 3]),
     "tet10": ("tetra10", [0, 1, 2, 3, 4, 5, 6, 7, 8, 9], [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]),
+    "quad4": ("quad", [0, 1, 2, 3], [0, 3, 2, 1]),
+    "quad8": ("quad8", [0, 1, 2, 3, 4, 5, 6, 7], [0, 3, 2, 1, 7, 6, 5, 4]),
+    "tri3": ("triangle", [0, 1, 2], [1, 0, 2]),
+    "tri6": ("triangle6", [0, 1, 2, 3, 4, 5], [1, 0, 2, 3, 5, 4]),
 }
 
 
 def cofactors(J: Any, xp: Any) -> tuple[Any, Any]:
-    """cof(J) = det(J) J^-T and det(J) of matrices (..., 3, 3)."""
+    """cof(J) = det(J) J^-T and det(J) of matrices (..., d, d), d = 2 or 3."""
+    if J.shape[-1] == 2:
+        cof = xp.stack([J[..., 1, ::-1], J[..., 0, ::-1]], axis=-2) * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return cof, (J[..., 0, :] * cof[..., 0, :]).sum(-1)
     a, b, c = J[..., 0, :], J[..., 1, :], J[..., 2, :]
     cof = xp.stack([xp.cross(b, c), xp.cross(c, a), xp.cross(a, b)], axis=-2)
     return cof, (a * cof[..., 0, :]).sum(-1)
@@ -44,17 +63,17 @@ class Element:
     def basis(self) -> Any:
         import skfem
 
-        return {"hex8": skfem.ElementHex1, "tet4": skfem.ElementTetP1, "tet10": skfem.ElementTetP2}[self.name]()
+        return getattr(skfem, ELEMENTS[self.name][0])()
 
     @cached_property
     def facet_basis(self) -> Any:
         """First-order shape functions on the reference facet, which map it to the sides of the element."""
         import skfem
 
-        return skfem.ElementQuad1() if self.name == "hex8" else skfem.ElementTriP1()
+        return getattr(skfem, ELEMENTS[self.name][1])()
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
-        """N (..., n_a) and dN/dxi (..., n_a, 3) at reference points xi (3, ...)."""
+        """N (..., n_a) and dN/dxi (..., n_a, d) at reference points xi (d, ...)."""
         pairs = [self.basis.lbasis(xi, a) for a in range(self.basis.doflocs.shape[0])]
         N = np.stack([np.broadcast_to(N, xi.shape[1:]) for N, _ in pairs], axis=-1)
         dN = np.stack([np.stack([np.broadcast_to(d, xi.shape[1:]) for d in dN], axis=-1) for _, dN in pairs], axis=-2)
@@ -65,18 +84,20 @@ class Element:
         from skfem.quadrature import get_quadrature
 
         domain = self.basis.refdom.brefdom if facets else self.basis.refdom
-        xi, w = get_quadrature(domain, QUADRATURE[self.name][facets])
+        xi, w = get_quadrature(domain, ELEMENTS[self.name][2][facets])
         return np.asarray(xi), np.asarray(w)
 
     def outside(self, xi: Array) -> Array:
-        """Distance (...,) of xi (..., 3) outside the reference element, in reference coordinates; negative inside."""
+        """Distance (...,) of xi (..., d) outside the reference element, in reference coordinates; negative inside."""
         below = -xi.min(axis=-1)
-        return np.asarray(np.maximum(below, xi.max(axis=-1) - 1.0 if self.name == "hex8" else xi.sum(axis=-1) - 1.0))
+        return np.asarray(np.maximum(below, xi.max(axis=-1) - 1.0 if self.name in BRICKS else xi.sum(axis=-1) - 1.0))
 
     def on_side(self, side: int, s: Array) -> tuple[Array, Array]:
-        """Points s (2, n_q) of the reference facet on a side: xi (3, n_q), outward d xi_1 x d xi_2 (n_q, 3)."""
+        """Points s (d - 1, n_q) of the reference facet on a side: xi (d, n_q), and outward normals (n_q, d)
+        d xi_1 x d xi_2, in a plane d xi turned by 90 degrees.
+        """
         domain = self.basis.refdom
-        corners = np.asarray(domain.p)[:, domain.facets[side]]  # (3, corners)
+        corners = np.asarray(domain.p)[:, domain.facets[side]]  # (d, corners)
         pairs = [self.facet_basis.lbasis(s, k) for k in range(corners.shape[1])]
         xi = sum(
             np.multiply.outer(v, np.broadcast_to(N, s.shape[1:])) for v, (N, _) in zip(corners.T, pairs, strict=True)
@@ -86,25 +107,34 @@ class Element:
                 np.multiply.outer(np.broadcast_to(dN[i], s.shape[1:]), v)
                 for v, (_, dN) in zip(corners.T, pairs, strict=True)
             )
-            for i in (0, 1)
+            for i in range(len(s))
         ]
-        normal = np.cross(*along)
+        normal = np.cross(*along) if len(s) == 2 else along[0][:, ::-1] * [1.0, -1.0]
         outward = normal @ (corners.mean(axis=1) - np.asarray(domain.p).mean(axis=1))
         return np.asarray(xi), normal * np.sign(outward)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Cells of one element type: nodes (n_e, n_a) of every cell, nodal positions X (n_nodes, 3) [m]."""
+    """Cells of one element type: nodes (n_e, n_a) of every cell, nodal positions X (n_nodes, d) [m].
+
+    d = 3, or 2 for a body of constant `thickness` [m], 1 for a solid, or an `axisymmetric` one that turns about x = 0.
+    """
 
     element: Element
     nodes: Array
     X: Array
+    thickness: float = 1.0
+    axisymmetric: bool = False
+
+    @property
+    def dim(self) -> int:
+        return int(self.X.shape[1])
 
     @cached_property
-    def _reference(self) -> tuple[Array, Array]:
+    def _reference(self) -> tuple[Array, Array, Array]:
         xi, w = self.element.quadrature()
-        return self.element.shape_functions(xi)[1], w  # (n_q, n_a, 3), (n_q,)
+        return *self.element.shape_functions(xi), w  # (n_q, n_a), (n_q, n_a, d), (n_q,)
 
     @cached_property
     def orientation(self) -> Array:
@@ -112,7 +142,7 @@ class Geometry:
         return np.asarray(np.sign(self._volumes(self.X, np)[2][:, :1]))
 
     def _volumes(self, X: Any, xp: Any) -> tuple[Any, Any, Any]:
-        dN_ref, w = self._reference
+        _, dN_ref, w = self._reference
         cof, det = cofactors(xp.einsum("eai,qaj->eqij", X[self.nodes], dN_ref), xp)
         return cof, det, w * det
 
@@ -122,21 +152,40 @@ class Geometry:
         return np.asarray(cofactors(np.einsum("eai,qaj->eqij", self.X[self.nodes], dN), np)[1])
 
     def at(self, X: Any, xp: Any) -> tuple[Any, Any]:
-        """dN (n_e, n_q, n_a, 3) [1/m] and dx (n_e, n_q) [m^3] for nodes at X."""
-        cof, det, w_det = self._volumes(X, xp)
-        dN = xp.einsum("qaj,eqij->eqai", self._reference[0], cof) / det[..., None, None]
-        return dN, w_det * self.orientation
+        """dN (n_e, n_q, n_a, m) [1/m] and dx (n_e, n_q) [m^3] for nodes at X.
+
+        m = d; with a third column N_a/r for an axisymmetric body, so that sum_a u_a dN_a has the hoop strain u_r/r.
+        """
+        (N, dN_ref, _), (cof, det, w_det) = self._reference, self._volumes(X, xp)
+        dN = xp.einsum("qaj,eqij->eqai", dN_ref, cof) / det[..., None, None]
+        if self.axisymmetric:
+            dN = xp.concatenate([dN, (N / self._radius(X[self.nodes], N, xp)[..., None])[..., None]], axis=-1)
+        return dN, w_det * self.orientation * self.depth(X[self.nodes], N, xp)
+
+    def depth(self, x: Any, N: Array, xp: Any) -> Any:
+        """Thickness or circumference [m] at points with the shape functions N (..., n_q, n_a), for nodes at x."""
+        return 2.0 * np.pi * self._radius(x, N, xp) if self.axisymmetric else self.thickness
+
+    @staticmethod
+    def _radius(x: Any, N: Array, xp: Any) -> Any:
+        return xp.einsum("...qa,...a->...q", N, x[..., 0])
+
+    @cached_property
+    def cell_size(self) -> float:
+        """The root of the cells' mean volume, or area [m]."""
+        volume = float(np.abs(self._volumes(self.X, np)[2]).sum())
+        return float((volume / len(self.nodes)) ** (1.0 / self.dim))
 
     @cached_property
     def metric(self) -> tuple[Array, Array]:
-        """dN, dx at X; dN (1, n_q, n_a, 3) if all cells are congruent up to rounding."""
+        """dN, dx at X; dN (1, n_q, n_a, m) if all cells are congruent up to rounding."""
         dN, dx = self.at(self.X, np)
         congruent = np.abs(dN - dN[:1]).max() <= CONGRUENCE_TOLERANCE * np.abs(dN).max()
         return (dN[:1] if congruent else dN), dx
 
     @cached_property
     def centres(self) -> Array:
-        """(n_e, 3) [m], the means of the cells' nodes."""
+        """(n_e, d) [m], the means of the cells' nodes."""
         return np.asarray(self.X[self.nodes].mean(axis=1))
 
     @cached_property
@@ -159,7 +208,7 @@ class Geometry:
         return name, np.where(self.orientation > 0, self.nodes[:, positive], self.nodes[:, negative])
 
     def locate(self, x: Array) -> tuple[Array, Array, Array]:
-        """Cell (m,) and reference coordinates (m, 3) of points x (m, 3), and their distance outside the cell (m,)."""
+        """Cell (m,) and reference coordinates (m, d) of points x (m, d), and their distance outside the cell (m,)."""
         X = self.X[self.nodes]
         low, high = X.min(axis=1), X.max(axis=1)
         margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may be curved
@@ -174,7 +223,7 @@ class Geometry:
         """The same for one point among candidate cells, by Newton's method for x = sum_a N_a(xi) X_a."""
         if not cells.size:  # outside the mesh: measure the distance to the nearest cell
             cells = np.array([np.linalg.norm(self.centres - x, axis=1).argmin()])
-        X, xi = X[cells], np.full((len(cells), 3), 0.25)
+        X, xi = X[cells], np.full((len(cells), self.dim), 0.25)
         for _ in range(20):
             N, dN = self.element.shape_functions(xi.T)
             r = np.einsum("ka,kai->ki", N, X) - x
@@ -188,58 +237,3 @@ class Geometry:
         outside = np.where(reached, self.element.outside(xi), np.inf)
         best = int(outside.argmin())
         return int(cells[best]), xi[best], float(outside[best])
-
-
-@dataclass(frozen=True, eq=False)
-class Facets:
-    """Sides of cells, with quadrature points.
-
-    cells, sides (n_f,)   the cell of each facet, and the number of the side
-    N (n_f, n_q, n_a)     shape functions of that cell at the points, dN (n_f, n_q, n_a, 3) by reference coordinates
-    n_ref (n_f, n_q, 3)   outward normal of the reference side times its weight
-    """
-
-    geometry: Geometry
-    cells: Array
-    sides: Array
-    N: Array
-    dN: Array
-    n_ref: Array
-
-    @classmethod
-    def of(cls, geometry: Geometry, cells: Array, sides: Array) -> Facets:
-        s, w = geometry.element.quadrature(facets=True)
-        kinds, which = np.unique(sides, return_inverse=True)
-        N, dN, n_ref = [], [], []
-        for side in kinds:
-            xi, normal = geometry.element.on_side(int(side), s)
-            values, derivatives = geometry.element.shape_functions(xi)
-            N.append(values)
-            dN.append(derivatives)
-            n_ref.append(normal * w[:, None])
-        return cls(geometry, cells, sides, np.stack(N)[which], np.stack(dN)[which], np.stack(n_ref)[which])
-
-    @property
-    def nodes(self) -> Array:
-        """(n_f, n_a), nodes of the facets' cells."""
-        return np.asarray(self.geometry.nodes[self.cells])
-
-    @cached_property
-    def node_set(self) -> Array:
-        """The nodes on the facets."""
-        return np.unique(self.nodes[(np.abs(self.N) > 1e-9).any(axis=1)])
-
-    def normals(self, x: Any, xp: Any) -> Any:
-        """Outward n dA (n_f, n_q, 3) [m^2] for nodes of the facets' cells at x (n_f, n_a, 3), deformed or not."""
-        cof, _ = cofactors(xp.einsum("fai,fqaj->fqij", x, self.dN), xp)
-        orientation = self.geometry.orientation[self.cells][..., None]
-        return xp.einsum("fqij,fqj->fqi", cof, self.n_ref) * orientation
-
-    @cached_property
-    def centres(self) -> Array:
-        """(n_f, 3) [m]."""
-        return np.asarray(np.einsum("fqa,fai->fqi", self.N, self.geometry.X[self.nodes]).mean(axis=1))
-
-    def areas(self, X: Any, xp: Any) -> Any:
-        """dA (n_f, n_q) [m^2] for nodes at X (n_nodes, 3)."""
-        return xp.sqrt((self.normals(X[self.nodes], xp) ** 2).sum(-1))

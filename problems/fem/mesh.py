@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,14 +12,23 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.elements import Element, ElementName, Facets, Geometry
+from gradient_routes.problems.fem.elements import BRICKS, MESHIO, Element, ElementName, Geometry
+from gradient_routes.problems.fem.facets import Facets
 from gradient_routes.problems.problem import Array
 
-SIDES = {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 1), "bottom": (2, 0), "top": (2, 1)}
-AXES = {"x": 0, "y": 1, "z": 2}
+# coordinate and end of the bounding box, of a solid and of a plane body
+SIDES = {
+    3: {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 1), "bottom": (2, 0), "top": (2, 1)},
+    2: {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)},
+}
+AXES = "xyz"
 PLANE_TOLERANCE = 1e-6  # of the diameter: largest distance of a facet's nodes from the plane
-MESHIO_CELLS: dict[str, ElementName] = {"hexahedron": "hex8", "tetra": "tet4", "tetra10": "tet10"}  # by meshio's names
-LOWER_DIMENSIONAL = ("vertex", "line", "triangle", "quad")  # meshio's cell types without volume
+MESHIO_CELLS: dict[int, dict[str, ElementName]] = {  # by meshio's names, for each dimension
+    3: {MESHIO[element][0]: element for element in ("hex8", "tet4", "tet10")},
+    2: {MESHIO[element][0]: element for element in ("quad4", "quad8", "tri3", "tri6")},
+}
+LOWER_DIMENSIONAL = {3: ("vertex", "line", "triangle", "quad"), 2: ("vertex", "line")}  # beginnings of meshio's names
+CORNERS = {"line3": ("line", 2), "triangle6": ("triangle", 3), "quad8": ("quad", 4)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +45,7 @@ class Mesh:
 
     @cached_property
     def bounding_box(self) -> Array:
-        """(2, 3) [m], the least and greatest coordinates."""
+        """(2, d) [m], the least and greatest coordinates."""
         X = self.geometry.X[np.unique(self.geometry.nodes)]
         return np.stack([X.min(axis=0), X.max(axis=0)])
 
@@ -46,7 +55,7 @@ class Mesh:
         return float(np.linalg.norm(self.bounding_box[1] - self.bounding_box[0]))
 
     def normalized(self, x: Array) -> Array:
-        """Points (..., 3) scaled to the unit cube: 0 at the least coordinate, 1 at the greatest."""
+        """Points (..., d) scaled to the unit cube: 0 at the least coordinate, 1 at the greatest."""
         return np.asarray((x - self.bounding_box[0]) / np.maximum(self.bounding_box[1] - self.bounding_box[0], 1e-300))
 
     @cached_property
@@ -64,21 +73,23 @@ class Mesh:
         return Facets.of(self.geometry, cells, (self.skfem_mesh.t2f[:, cells] == facets).argmax(axis=0))
 
     def _on_plane(self, where: str) -> Array:
-        if where in SIDES:
-            axis, end = SIDES[where]
+        dim, sides = self.geometry.dim, SIDES[self.geometry.dim]
+        if where in sides:
+            axis, end = sides[where]
             value = self.bounding_box[end, axis]
         else:
             name, _, text = where.partition("=")
             try:
-                axis, value = AXES[name.strip()], float(text)
-            except (KeyError, ValueError):
+                axis, value = AXES[:dim].index(name.strip() or "?"), float(text)
+            except ValueError:
                 raise InputError(f"{self.who}: no boundary '{where}' - {self._choices()}") from None
         boundary = self.skfem_mesh.boundary_facets()
         away = np.abs(self.skfem_mesh.p[axis][self.skfem_mesh.facets[:, boundary]] - value).max(axis=0)
         return np.asarray(boundary[away <= PLANE_TOLERANCE * self.diameter])
 
     def _choices(self) -> str:
-        return f"choose {', '.join([*self.boundaries, *SIDES])} or a plane such as z={self.bounding_box[0, 2]:g}"
+        last, names = self.geometry.dim - 1, [*self.boundaries, *SIDES[self.geometry.dim]]
+        return f"choose {', '.join(names)} or a plane such as {AXES[last]}={self.bounding_box[0, last]:g}"
 
 
 def box_mesh(who: str, element: ElementName, cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
@@ -86,13 +97,14 @@ def box_mesh(who: str, element: ElementName, cells: tuple[int, int, int], size: 
     from skfem import MeshHex
 
     mesh: Any = MeshHex.init_tensor(*(np.linspace(0.0, L, n + 1) for L, n in zip(size, cells, strict=True)))
-    return _make_mesh(who, element, mesh if element == "hex8" else mesh.to_meshtet())
+    return make_mesh(who, element, mesh if element in BRICKS else mesh.to_meshtet())
 
 
-def read_mesh(who: str, path: str | Path) -> Mesh:
-    """The hexahedra or tetrahedra of a mesh file that meshio reads, with its named boundaries.
+def read_mesh(who: str, path: str | Path, dim: int = 3) -> Mesh:
+    """The hexahedra or tetrahedra of a mesh file that meshio reads, with its named boundaries; dim = 2: the
+    quadrilaterals or triangles, in a plane z = constant.
 
-    Raises InputError for a file that cannot be read, that has no volume cells of one kind, or inverted cells.
+    Raises InputError for a file that cannot be read, without cells of one kind and this dimension, or inverted ones.
     """
     import meshio
     from skfem.io.meshio import from_meshio
@@ -106,22 +118,30 @@ def read_mesh(who: str, path: str | Path) -> Mesh:
     except (Exception, SystemExit) as error:  # meshio's readers raise errors of many types
         said = " ".join(f"{said_aside.getvalue()} {error}".split()) or f"{type(error).__name__}, a broken file?"
         raise InputError(f"{who}: mesh={path} cannot be read ({said}) - give a format meshio knows") from None
-    kinds = [kind for kind in found.cells_dict if not kind.startswith(LOWER_DIMENSIONAL)]
-    if len(kinds) != 1 or kinds[0] not in MESHIO_CELLS:
+    known = MESHIO_CELLS[dim]
+    kinds = [kind for kind in found.cells_dict if not kind.startswith(LOWER_DIMENSIONAL[dim])]
+    if len(kinds) != 1 or kinds[0] not in known:
         has = ", ".join(found.cells_dict) or "no cells"
-        raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(MESHIO_CELLS)}")
-    cells = found.cells_dict[kinds[0]]
+        raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(known)}")
+    element, cells = known[kinds[0]], found.cells_dict[kinds[0]]
     if cells.min() < 0 or cells.max() >= len(found.points):
         raise InputError(f"{who}: mesh={path} has cells of points beyond its {len(found.points)} - correct the file")
-    if np.shape(found.points)[1:] != (3,):
+    X = found.points
+    if not dim <= X.shape[1] <= 3:
         raise InputError(
-            f"{who}: mesh={path} has points of {np.shape(found.points)[-1]} coordinates - it needs x, y, z"
+            f"{who}: mesh={path} has points of {X.shape[1]} coordinates - it needs {', '.join(AXES[:dim])}"
         )
-    for block in found.cells:
-        if block.type == "triangle6":  # scikit-fem matches facets by their corners only
-            block.type, block.data = "triangle", block.data[:, :3]
-    skfem_mesh = from_meshio(found, force_meshio_type=kinds[0], ignore_orientation=True)
-    mesh = _make_mesh(who, MESHIO_CELLS[kinds[0]], skfem_mesh)
+    if dim == 2 and X.shape[1] == 3 and np.ptp(X[cells], axis=(0, 1))[2] > PLANE_TOLERANCE * np.ptp(X[cells]):
+        low, high = X[cells][..., 2].min(), X[cells][..., 2].max()
+        raise InputError(f"{who}: mesh={path} is not plane: z from {low:g} to {high:g} - give one in the plane z = 0")
+    for block in found.cells:  # scikit-fem matches facets by their corners only, and has no quad8
+        if block.type in CORNERS and (dim, block.type) != (2, "triangle6"):
+            block.type, block.data = CORNERS[block.type][0], block.data[:, : CORNERS[block.type][1]]
+    kind = "quad" if element == "quad8" else kinds[0]
+    mesh = make_mesh(who, element, from_meshio(found, force_meshio_type=kind, ignore_orientation=True))
+    if element == "quad8":
+        geometry = replace(mesh.geometry, nodes=cells, X=np.ascontiguousarray(X[:, :2]))
+        mesh = replace(mesh, geometry=geometry)
     _check_cells(mesh, path)
     return mesh
 
@@ -133,10 +153,11 @@ def _check_cells(mesh: Mesh, path: str | Path) -> None:
         raise InputError(f"{mesh.who}: mesh={path} has points that are not finite - correct the file")
     det = geometry.determinants()  # (n_e, n_a), at the nodes
     extent = np.ptp(geometry.X[geometry.nodes], axis=1).max(axis=1)[:, None]
-    bad = (np.abs(det) <= 1e-12 * extent**3).any(axis=1) | (np.sign(det) != np.sign(det[:, :1])).any(axis=1)
+    bad = (np.abs(det) <= 1e-12 * extent**geometry.dim).any(axis=1) | (np.sign(det) != np.sign(det[:, :1])).any(axis=1)
     inner = np.flatnonzero(skfem_mesh.f2t[1] != -1)
-    corners = skfem_mesh.p[:, skfem_mesh.facets[:, inner]]  # (3, 3 or 4, n_f)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], axis=0)
+    corners = skfem_mesh.p[:, skfem_mesh.facets[:, inner]]  # (d, corners, n_f)
+    a, b = corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0]
+    normal = np.cross(a, b, axis=0) if geometry.dim == 3 else np.stack([-a[1], a[0]])
     centre = skfem_mesh.p[:, skfem_mesh.t].mean(axis=1)
     sides = [((centre[:, skfem_mesh.f2t[k, inner]] - corners.mean(axis=1)) * normal).sum(axis=0) for k in (0, 1)]
     bad[skfem_mesh.f2t[:, inner[sides[0] * sides[1] >= 0]]] = True
@@ -147,10 +168,16 @@ def _check_cells(mesh: Mesh, path: str | Path) -> None:
         )
 
 
-def _make_mesh(who: str, element: ElementName, mesh: Any) -> Mesh:
-    if element == "tet10":
-        from skfem import MeshTet2
+def make_mesh(who: str, element: ElementName, mesh: Any) -> Mesh:
+    """From scikit-fem's mesh of the corners, or of all nodes of a tet10 or tri6."""
+    if element == "quad8":
+        nodes = np.concatenate([mesh.t, mesh.nvertices + mesh.t2f])
+        X = np.concatenate([mesh.p, mesh.p[:, mesh.facets].mean(axis=1)], axis=1)
+        return Mesh(who, mesh, Geometry(Element(element), nodes.T, np.ascontiguousarray(X.T)))
+    if element in ("tet10", "tri6"):
+        from skfem import MeshTet2, MeshTri2
 
-        quadratic = mesh if isinstance(mesh, MeshTet2) else MeshTet2.from_mesh(mesh)
+        kind = MeshTet2 if element == "tet10" else MeshTri2
+        quadratic = mesh if isinstance(mesh, kind) else kind.from_mesh(mesh)
         return Mesh(who, quadratic, Geometry(Element(element), quadratic.dofs.element_dofs.T, quadratic.doflocs.T))
     return Mesh(who, mesh, Geometry(Element(element), np.ascontiguousarray(mesh.t.T), np.ascontiguousarray(mesh.p.T)))

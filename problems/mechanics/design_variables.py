@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.elements import Facets
+from gradient_routes.problems.fem.facets import Facets
 from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.problem import Array, Parameters
 
@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from gradient_routes.problems.mechanics.materials import MaterialLaw
 
 DesignName = Literal["modulus", "layers", "constants", "traction", "shape", "load"]
-FIELDS: tuple[DesignName, ...] = ("modulus", "layers")
-MATERIAL: tuple[DesignName, ...] = ("modulus", "layers", "constants")
+PlaneDesign = Literal["modulus", "layers", "constants", "thickness", "traction", "shape", "load"]
+AnyDesign = DesignName | PlaneDesign
+CELLWISE: tuple[AnyDesign, ...] = ("modulus", "thickness")
+FIELDS: tuple[AnyDesign, ...] = (*CELLWISE, "layers")
+MATERIAL: tuple[AnyDesign, ...] = (*FIELDS, "constants")
 MAX_DEFAULT_LAYERS = 4
 THETA_MAX = 300.0  # exp(THETA_MAX) and its square stay in float64's range
 
@@ -28,8 +31,8 @@ class Setup:
     """Everything R depends on besides u.
 
     q     material constants, numbers or (n_e,) [Pa]
-    X     nodal positions (n_nodes, 3) [m]
-    load  the amplitude [Pa] or [m], or tractions (n_f, 3) [Pa]
+    X     nodal positions (n_nodes, d) [m]
+    load  the amplitude [Pa] or [m], or tractions (n_f, d) [Pa]
     """
 
     q: tuple[Any, ...]
@@ -41,34 +44,41 @@ class Setup:
 class DesignVariables:
     """The meaning of p.
 
-    apply            (setup, p, xp) -> the setup with p inserted
-    truth            the p (n_p,) that synthetic data are computed from
-    q_p              (p) -> for every material constant, its derivative with respect to the one parameter a cell
-                     depends on, and the index of that parameter, both (n_e,); None unless p sets the material
-    modulus_of_cell  (n_e,) index of each cell's modulus, if p are moduli
-    moved_nodes      the nodes whose positions p are, if it is a shape
-    is_load          whether p is the load amplitude
+    apply              (setup, p, xp) -> the setup with p inserted
+    truth              the p (n_p,) that synthetic data are computed from
+    q_p                (p) -> for every material constant, its derivative with respect to the one parameter a cell
+                       depends on, and the index of that parameter, both (n_e,); None unless p sets the material
+    field              E or t, if p are moduli or thicknesses of cells or layers
+    parameter_of_cell  (n_e,) index of each cell's parameter, if it is such a field
+    moved_nodes        the nodes whose positions p are, if it is a shape
+    is_load            whether p is the load amplitude
     """
 
     parameters: Parameters
     apply: Callable[[Setup, Any, Any], Setup]
     truth: Array
     q_p: Callable[[Array], list[tuple[Array, Array]]] | None = None
-    modulus_of_cell: Array | None = None
+    field: str | None = None
+    parameter_of_cell: Array | None = None
     moved_nodes: Array | None = None
     is_load: bool = False
 
 
 def default_modulus(x: Array) -> Array:
-    """E(x) = 1 + 0.4 sin(2 pi x) cos(2 pi y) + 0.3 z [Pa] at points x (..., 3) of the unit cube."""
-    x, y, z = np.moveaxis(x, -1, 0)
+    """E(x) = 1 + 0.4 sin(2 pi x) cos(2 pi y) + 0.3 z [Pa] at points x (..., 3) of the unit cube, or its section."""
+    x, y, z = np.moveaxis(_in_cube(x), -1, 0)
     return np.asarray(1.0 + 0.4 * np.sin(2.0 * np.pi * x) * np.cos(2.0 * np.pi * y) + 0.3 * z)
 
 
 def inclusion(x: Array) -> Array:
     """E(x) = 4 in a ball of radius 0.3 about (0.5, 0.5, 0.6), at least at the point nearest its centre, else 1 [Pa]."""
-    r = np.linalg.norm(x - [0.5, 0.5, 0.6], axis=-1)
+    r = np.linalg.norm(_in_cube(x) - [0.5, 0.5, 0.6], axis=-1)
     return np.where(r < max(0.3, 1.001 * r.min()), 4.0, 1.0)
+
+
+def _in_cube(x: Array) -> Array:
+    """Points (..., d) in the unit cube (..., 3): a plane body is its section y = 0.5."""
+    return x if x.shape[-1] == 3 else np.insert(x, 1, 0.5, axis=-1)
 
 
 def moduli(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool) -> DesignVariables:
@@ -76,7 +86,27 @@ def moduli(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool) ->
     x = mesh.normalized(mesh.geometry.centres)
     start = np.ones(len(x)) if uniform else default_modulus(x)
     cells = np.arange(len(x))
-    return _from_moduli(law, nu, log, start, inclusion(x), cells, mesh.geometry.centres, "E")
+    return _cellwise(_moduli_q(law, nu), log, start, inclusion(x), cells, mesh.geometry.centres, "E")
+
+
+def thicknesses(mesh: Mesh, q: tuple[Any, ...], log: bool, uniform: bool) -> DesignVariables:
+    """One thickness per cell of a plane body; its loads are those of the nominal thickness.
+
+    A cell of thickness t and constants q deforms as one of the nominal thickness t_0 and constants q t/t_0.
+    """
+    x, t_0 = mesh.normalized(mesh.geometry.centres), mesh.geometry.thickness
+    start = np.ones(len(x)) if uniform else default_modulus(x)
+    cells = np.arange(len(x))
+
+    def q_of(t: Any) -> tuple[Any, ...]:
+        return tuple(c * (t / t_0) for c in q)
+
+    centres = mesh.geometry.centres
+    return _cellwise(q_of, log, t_0 * start, t_0 * inclusion(x), cells, centres, "t", unit="m", scale=t_0)
+
+
+def _moduli_q(law: MaterialLaw, nu: float) -> Callable[[Any], tuple[Any, ...]]:
+    return lambda E: law.of_modulus(E, nu)
 
 
 def layers(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, count: int | None) -> DesignVariables:
@@ -84,7 +114,7 @@ def layers(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, co
 
     Raises InputError where a layer holds no cell's centre.
     """
-    height = mesh.normalized(mesh.geometry.centres)[:, 2]
+    height = mesh.normalized(mesh.geometry.centres)[:, -1]
     if count is None:
         count = next(n for n in range(MAX_DEFAULT_LAYERS, 0, -1) if not _empty_layers(height, n).size)
     empty = _empty_layers(height, count)
@@ -93,11 +123,11 @@ def layers(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, co
             f"{mesh.who}: layers={count}, but no cell's centre lies in layer {empty[0] + 1} - choose fewer"
         )
     layer = _layer_numbers(height, count)
-    z = (np.arange(count) + 0.5) / count
-    middle = np.stack([np.full(count, 0.5)] * 2 + [z], axis=1)
+    middle = np.full((count, mesh.geometry.dim), 0.5)
+    middle[:, -1] = z = (np.arange(count) + 0.5) / count
     start = np.ones(count) if uniform else 1.0 + 0.3 * z
     position = mesh.bounding_box[0] + middle * (mesh.bounding_box[1] - mesh.bounding_box[0])
-    return _from_moduli(law, nu, log, start, inclusion(middle), layer, position, "E_layer")
+    return _cellwise(_moduli_q(law, nu), log, start, inclusion(middle), layer, position, "E_layer")
 
 
 def _layer_numbers(height: Array, count: int) -> Array:
@@ -109,35 +139,36 @@ def _empty_layers(height: Array, count: int) -> Array:
     return np.setdiff1d(np.arange(count), _layer_numbers(height, count))
 
 
-def _from_moduli(
-    law: MaterialLaw,
-    nu: float,
+def _cellwise(
+    q_of: Callable[[Any], tuple[Any, ...]],
     log: bool,
     start: Array,
     truth: Array,
-    modulus_of_cell: Array,
+    parameter_of_cell: Array,
     position: Array,
     name: str,
+    unit: str = "Pa",
+    scale: float = 1.0,
 ) -> DesignVariables:
-    """Moduli E, E[modulus_of_cell[e]] in cell e; the material constants are proportional to E."""
+    """A value v in each cell e, v[parameter_of_cell[e]], to which the constants q_of(v) are proportional."""
 
     def q(p: Any, xp: Any) -> tuple[Any, ...]:
-        return law.of_modulus((xp.exp(p) if log else p)[modulus_of_cell], nu)
+        return q_of((xp.exp(p) if log else p)[parameter_of_cell])
 
     def q_p(p: Array) -> list[tuple[Array, Array]]:
-        return [(c if log else c / p[modulus_of_cell], modulus_of_cell) for c in q(p, np)]
+        return [(c if log else c / p[parameter_of_cell], parameter_of_cell) for c in q(p, np)]
 
     parameters = Parameters(
         start=np.log(start) if log else start,
-        scale=np.ones(len(start)),
+        scale=np.full(len(start), 1.0 if log else scale),
         lower=-THETA_MAX if log else 0.0,
         upper=THETA_MAX if log else np.inf,
-        unit="log Pa" if log else "Pa",
+        unit=f"log {unit}" if log else unit,
         label=(lambda i: f"log {name}_{i + 1}") if log else (lambda i: f"{name}_{i + 1}"),
         position=position,
     )
     truth = np.log(truth) if log else truth
-    return DesignVariables(parameters, lambda s, p, xp: replace(s, q=q(p, xp)), truth, q_p, modulus_of_cell)
+    return DesignVariables(parameters, lambda s, p, xp: replace(s, q=q(p, xp)), truth, q_p, name[0], parameter_of_cell)
 
 
 def constants(mesh: Mesh, law: MaterialLaw, nu: float) -> DesignVariables:
@@ -160,20 +191,19 @@ def constants(mesh: Mesh, law: MaterialLaw, nu: float) -> DesignVariables:
 
 def tractions(mesh: Mesh, facets: Facets, amplitude: float) -> DesignVariables:
     """The traction vector of every loaded facet."""
-    n_f = len(facets.cells)
-    start = np.zeros((n_f, 3))
-    start[:, 2] = amplitude
     x = facets.centres
-    bump = 1.0 + 0.5 * np.prod(np.sin(np.pi * mesh.normalized(x)[:, :2]), axis=1)
+    start, d = np.zeros_like(x), mesh.geometry.dim
+    start[:, -1] = amplitude
+    bump = 1.0 + 0.5 * np.prod(np.sin(np.pi * mesh.normalized(x)[:, :-1]), axis=1)
     parameters = Parameters(
         start=start.ravel(),
-        scale=np.full(3 * n_f, abs(amplitude) or 1.0),
+        scale=np.full(start.size, abs(amplitude) or 1.0),
         unit="Pa",
-        label=lambda i: f"t_{'xyz'[i % 3]}({i // 3 + 1})",
-        position=np.repeat(x, 3, axis=0),
+        label=lambda i: f"t_{'xyz'[i % d]}({i // d + 1})",
+        position=np.repeat(x, d, axis=0),
     )
     truth = np.ravel(start * bump[:, None])
-    return DesignVariables(parameters, lambda s, p, xp: replace(s, load=p.reshape(n_f, 3)), truth)
+    return DesignVariables(parameters, lambda s, p, xp: replace(s, load=p.reshape(start.shape)), truth)
 
 
 def shape(mesh: Mesh, where: str, held: Array) -> DesignVariables:
@@ -181,18 +211,15 @@ def shape(mesh: Mesh, where: str, held: Array) -> DesignVariables:
     nodes = np.setdiff1d(mesh.boundary(where).node_set, held)
     if not nodes.size:
         raise InputError(f"{mesh.who}: surface={where}: all its nodes are clamped or loaded - choose a free surface")
-    X, n = mesh.geometry.X, len(mesh.geometry.X)
-    index: Array = np.arange(3 * n)  # into (X, p)
-    moved = np.ravel(3 * nodes[:, None] + np.arange(3))
-    index[moved] = 3 * n + np.arange(len(moved))
-    index = index.reshape(n, 3)
-    cell = float(np.cbrt(mesh.geometry.metric[1].sum() / len(mesh.geometry.nodes)))
+    X, d = mesh.geometry.X, mesh.geometry.dim
+    index = np.arange(X.size).reshape(X.shape)  # into (X, p)
+    index[nodes] = X.size + np.arange(nodes.size * d).reshape(-1, d)
     parameters = Parameters(
         start=X[nodes].ravel(),
-        scale=np.full(len(moved), cell),
+        scale=np.full(nodes.size * d, mesh.geometry.cell_size),
         unit="m",
-        label=lambda i: f"{'xyz'[i % 3]}({nodes[i // 3] + 1})",
-        position=np.repeat(X[nodes], 3, axis=0),
+        label=lambda i: f"{'xyz'[i % d]}({nodes[i // d] + 1})",
+        position=np.repeat(X[nodes], d, axis=0),
     )
     inward = mesh.bounding_box.mean(axis=0) - X[nodes]
     truth = np.ravel(X[nodes] + 0.05 * inward)

@@ -16,7 +16,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import DomainError
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions
-from gradient_routes.problems.fem.elements import Facets
+from gradient_routes.problems.fem.facets import Facets
 from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, GeneralPattern, SymmetricPattern
 from gradient_routes.problems.mechanics.design_variables import DesignVariables, Setup
@@ -34,7 +34,8 @@ Load = Literal["traction", "displacement", "follower"]
 class LoadedSolid:
     """The equilibrium equations in one or more load cases.
 
-    directions (cases, 3)  traction or grip displacement per unit amplitude; of a follower load, z is its normal part
+    directions (cases, d)  traction or grip displacement per unit amplitude; of a follower load, the last is its normal
+                           part
     base                   the setup for everything that p does not set
     use_numpy              take P, A and dP/dq from hand-derived NumPy code instead of JAX
     """
@@ -107,17 +108,17 @@ class LoadedSolid:
         return Pi
 
     def dead_forces(self, s: Setup, case: int, xp: Any) -> Any:
-        """Nodal forces (n_f, n_a, 3) [N] of the traction on the loaded facets."""
-        t = s.load if s.load.ndim == 2 else s.load * self.directions[case][None]  # (n_f or 1, 3)
+        """Nodal forces (n_f, n_a, d) [N] of the traction on the loaded facets."""
+        t = s.load if s.load.ndim == 2 else s.load * self.directions[case][None]  # (n_f or 1, d)
         return xp.einsum("fqa,fq->fa", self.loaded.N, self.loaded.areas(s.X, xp))[..., None] * t[:, None]
 
     def follower_forces(self, u_f: Any, s: Setup, case: int, xp: Any) -> Any:
-        """The same for a traction along the deformed normal; u_f (n_f, n_a, 3) displacements of the facets' cells."""
+        """The same for a traction along the deformed normal; u_f (n_f, n_a, d) displacements of the facets' cells."""
         normals = self.loaded.normals(s.X[self.loaded.nodes] + u_f, xp)
-        return s.load * self.directions[case, 2] * xp.einsum("fqa,fqi->fai", self.loaded.N, normals)
+        return s.load * self.directions[case, -1] * xp.einsum("fqa,fqi->fai", self.loaded.N, normals)
 
     def external_forces(self, u: Array, s: Setup, case: int) -> Array | None:
-        """Nodal forces (n_f, n_a, 3) [N] on the loaded facets; None for a prescribed displacement."""
+        """Nodal forces (n_f, n_a, d) [N] on the loaded facets; None for a prescribed displacement."""
         if self.load == "traction":
             return np.asarray(self.dead_forces(s, case, np))
         if self.load == "follower":
@@ -195,17 +196,17 @@ class LoadedSolid:
         dofs = self.bc.dofs(geometry.nodes)
         if not self.symmetric:
             return GeneralPattern.of_elements(dofs, n)
-        return SymmetricPattern.of_elements(dofs, n, self.bc.rigid_body_modes(geometry.X))
+        return SymmetricPattern.of_elements(dofs, n, self.bc.near_nullspace(geometry))
 
     @cached_property
     def _selected(self) -> Array:
         """Flat indices of the element matrix entries that the pattern stores."""
-        m = 3 * self.mesh.geometry.nodes.shape[1]
+        m = self.mesh.geometry.dim * self.mesh.geometry.nodes.shape[1]
         i, j = np.triu_indices(m)
         return i * m + j if self.symmetric else np.arange(m * m)
 
     def _follower_tangents(self, u_f: Array, s: Setup, case: int) -> Array:
-        """df_ext/du_f, (n_f, (3 n_a)^2)."""
+        """df_ext/du_f, (n_f, (d n_a)^2)."""
         return np.asarray(self._follower_derivative(u_f, s.load, s.X, case)).reshape(len(u_f), -1)
 
     @cached_property
@@ -217,7 +218,7 @@ class LoadedSolid:
 
         def columns(u_f: Any, load: Any, X: Any, case: int) -> Any:
             """Facets are decoupled: one product gives one column of every facet matrix."""
-            m = 3 * u_f.shape[1]
+            m = u_f.shape[1] * u_f.shape[2]
             units = jnp.broadcast_to(jnp.eye(m, dtype=u_f.dtype).reshape(m, 1, *u_f.shape[1:]), (m, *u_f.shape))
             along = jax.vmap(lambda v: jax.jvp(lambda u_f: forces(u_f, load, X, case), (u_f,), (v,))[1])(units)
             return jnp.moveaxis(along, 0, -1)  # (n_f, n_a, 3, m)

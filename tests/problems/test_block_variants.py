@@ -180,7 +180,7 @@ def test_layers_default_to_four_or_what_the_mesh_has(nz: int, n_p: int) -> None:
     assert len(p) == n_p
     finer, q = block.refined(p)
     assert len(finer.parameters) == len(q) == n_p
-    assert set(block.solid.design.modulus_of_cell) == set(range(n_p))
+    assert set(block.solid.design.parameter_of_cell) == set(range(n_p))
     with pytest.raises(InputError, match=r"lies in layer \d - choose fewer"):
         Block(n=1, nz=nz, unknown="layers", layers=nz + 1 if nz < 4 else 2 * nz)
 
@@ -261,7 +261,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"size": "1,2"}, "size=1,2"),
     ({"size": "0"}, "size=0"),
     ({"size": "a"}, "size=a"),
-    ({"clamped": "none"}, "free to turn"),
+    ({"clamped": "none"}, "free to move"),
     ({"clamped": "nowhere"}, "no boundary 'nowhere'"),
     ({"loaded": "z=7"}, "no facet"),
     ({"mesh": "nowhere.msh", "nx": None, "ny": None, "nz": None}, "no such file"),

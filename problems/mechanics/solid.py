@@ -1,0 +1,256 @@
+"""A hyperelastic body held on one face and loaded on another: what all problems of solids share."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gradient_routes.problems.data import probes
+from gradient_routes.problems.data.displacement_data import DisplacementData
+from gradient_routes.problems.data.observation import Candidates, Observation
+from gradient_routes.problems.data.regularization import Phi, Prior
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, held_components
+from gradient_routes.problems.fem.mesh import AXES, Mesh
+from gradient_routes.problems.fem.prolongation import prolongate
+from gradient_routes.problems.mechanics import design_variables
+from gradient_routes.problems.mechanics.design_variables import (
+    CELLWISE,
+    FIELDS,
+    MATERIAL,
+    AnyDesign,
+    DesignVariables,
+    Setup,
+)
+from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
+from gradient_routes.problems.problem import (
+    Array,
+    Fields,
+    Linearization,
+    Offers,
+    Operator,
+    ParameterView,
+    Problem,
+    Traced,
+)
+
+if TYPE_CHECKING:
+    from gradient_routes.problems.mechanics.materials import MaterialLaw
+
+TARGET = 0.2  # displacement wanted at the top, per height
+NEARLY_INCOMPRESSIBLE = 0.495
+
+
+class Solid(Problem):
+    """State u (n_u,) [m], the free displacement components node by node, one load case after the other.
+
+    Without data, the target displacement at a height is 0.2 of it times the direction of the load case.
+    """
+
+    offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
+    load_steps = True
+    locks = True
+    regularization: Prior
+
+    def __init__(self, options: dict[str, Any], mesh: Mesh, law: MaterialLaw, directions: Array) -> None:
+        """`options` of the problem, which its checks have passed; directions (cases, d) of its loads."""
+        o = SimpleNamespace(**options)
+        self._options, self.mesh = options, mesh
+        use_numpy = o.derivatives == "hand"
+        if use_numpy and law.numpy is None:
+            raise InputError(
+                f"{self.name}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad"
+            )
+        law.check(law.of_modulus(1.0, o.nu))
+        top, held = mesh.boundary(o.loaded), held_components(mesh, o.clamped, o.fixed)
+        clamp = np.flatnonzero(held.all(axis=1))
+        moved = np.setdiff1d(top.node_set, clamp)
+        if not moved.size:
+            raise InputError(f"{self.name}: loaded={o.loaded}: all its nodes are clamped - choose another face")
+        gripped = o.load == "displacement"
+        self.log, uniform = o.parametrization != "raw", o.data == "twin"
+        amplitude, unit = (o.displacement, "m") if gripped else (o.traction, "Pa")
+        E = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
+        q = law.of_modulus(E, o.nu)
+        choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
+            "modulus": lambda: design_variables.moduli(mesh, law, o.nu, self.log, uniform),
+            "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, o.layers),
+            "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
+            "constants": lambda: design_variables.constants(mesh, law, o.nu),
+            "traction": lambda: design_variables.tractions(mesh, top, o.traction),
+            "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d(clamp, top.node_set)),
+            "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
+        }
+        base = Setup(q, mesh.geometry.X, np.float64(amplitude))
+        bc = BoundaryConditions.of(mesh, held, moved if gripped else np.zeros(0, dtype=int), directions)
+        self.solid = LoadedSolid(mesh, law, bc, top, o.load, directions, choices[o.unknown](), base, use_numpy)
+        self.parameters = self.solid.design.parameters
+        self.regularization = self._prior(o.alpha, o.phi, o.phi_width, o.unknown)
+        self.n_state = bc.n_u
+        self.linear = o.law == "linear" and o.load != "follower"
+        self.affine = self.linear and o.unknown in ("traction", "load")
+        self.structure = "spd" if self.solid.symmetric else "general"
+        self.matrix_free = not use_numpy
+        self.noise, self.seed, self.synthetic = o.noise, o.seed, uniform
+        if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:
+            self.notes += (f"nu={o.nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
+        if amplitude == 0.0 and o.unknown in MATERIAL:
+            self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
+        if o.data is not None and o.data != "twin":
+            self.data = self._from_file(o.data)
+        elif o.markers:
+            in_plane = o.components == "in-plane"
+            self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
+        else:
+            where = o.sensors or ("right" if gripped else o.loaded)
+            nodes = np.unique(mesh.geometry.nodes) if where == "everywhere" else mesh.boundary(where).node_set
+            self.data = self._without_file(probes.at_nodes(mesh, nodes))
+        if self.data.reads_nothing():
+            raise InputError(f"{self.name}: all sensors sit on clamped nodes and read zero - choose other points")
+
+    def _from_file(self, path: str) -> DisplacementData:
+        """Measurements read from a file."""
+        points, d = probes.read_probes(self.mesh, path)
+        greatest, size = float(np.abs(d).max()), self.mesh.diameter
+        if greatest > size:
+            self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
+        return DisplacementData(self.solid, points, d[None])
+
+    def _without_file(self, points: probes.Probes) -> DisplacementData:
+        """The target displacements; none yet for synthetic data."""
+        height = TARGET * (points.x[:, -1] - self.mesh.bounding_box[0, -1])
+        target = height[None, :, None] * self.solid.directions[:, None]
+        return DisplacementData(self.solid, points, None if self.synthetic else target, self.noise)
+
+    def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: AnyDesign) -> Prior:
+        """Neighbours are cells that share a facet, and adjacent layers."""
+        kind = phi or ("tikhonov" if unknown in FIELDS else "amplitude")
+        f2t = self.mesh.skfem_mesh.f2t
+        pairs = np.asarray(f2t.T[f2t[1] != -1]) if unknown in CELLWISE else None
+        prior = Prior(alpha, kind, width, pairs, self.parameters.start, self.parameters.scale)
+        if kind == "amplitude" and unknown in FIELDS:
+            prior = replace(prior, origin=self._theta(self.parameters.start), scale=1.0)
+        prior.check(self.name)
+        return prior
+
+    # --- the problem contract
+
+    def initial(self, p: Array) -> Array:
+        return self.solid.initial(p)
+
+    def residual(self, u: Array, p: Array) -> Array:
+        return self.solid.residual(u, p)
+
+    def tangent(self, u: Array, p: Array) -> Any:
+        return self.solid.tangent(u, p)
+
+    def tangent_operator(self, u: Array, p: Array) -> Operator:
+        return self.solid.tangent_operator(u, p)
+
+    def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
+        """J = 1/2 sum over load cases of |S u - d|^2, and alpha Phi [m^2]."""
+        J = self.data.misfit(u, p, xp)
+        return J + self.regularization.value(xp, self._theta(p, xp)) if self.alpha else J
+
+    def _theta(self, p: Any, xp: Any = np) -> Any:
+        """The regularized quantity: log E or log t of fields, else p."""
+        return p if self.log or self.solid.design.field is None else xp.log(p)
+
+    def observation(self, u: Array, p: Array) -> Observation:
+        return self.data.observation(u, p)
+
+    def candidates(self) -> Candidates:
+        return self.data.candidates()
+
+    def prior(self, p: Array) -> tuple[Prior, Array, Array]:
+        theta = self._theta(p)
+        return self.regularization, theta, np.ones_like(p) if theta is p else 1.0 / p
+
+    def linearize(self, u: Array, p: Array) -> Linearization:
+        J_u, J_a = self.data.misfit_gradient(u, p)
+        J_p = np.full_like(p, J_a if self.solid.grip_is_parameter else 0.0)
+        if self.alpha:
+            prior, theta, by_p = self.prior(p)
+            J_p = J_p + prior.gradient(theta) * by_p
+        return Linearization(self.solid.R_p(u, p), J_u, J_p)
+
+    def traced(self) -> Traced:
+        from gradient_routes.problems.jax64 import jnp
+
+        return Traced(residual=self.solid.traced_residual, objective=lambda u, p: self.objective(u, p, jnp))
+
+    def refined(self, p: Array) -> tuple[Solid, Array] | None:
+        """Twice as many cells along every edge of a built-in mesh; None for mesh files and for p that depends on the
+        mesh. Synthetic data have to be computed anew.
+        """
+        o, unknown = self._options, self._options["unknown"]
+        if o["mesh"] is not None or unknown in ("traction", "shape"):
+            return None
+        doubled = {name: 2 * (o[name] or o["n"]) for name in ("nx", "ny", "nz") if name in o}
+        layers = len(p) if unknown == "layers" else None
+        finer = type(self)(**o | doubled | {"n": 2 * o["n"], "layers": layers})
+        if unknown not in ("modulus", "thickness"):
+            return finer, p
+        return finer, prolongate(p, self.mesh.geometry.centres, finer.mesh.geometry.centres)
+
+    # --- synthetic data
+
+    def truth(self) -> Array | None:
+        return self.solid.design.truth if self.synthetic else None
+
+    def twin(self) -> Solid | None:
+        return self._with(self.data.zeros()) if self.data.d is None else None
+
+    def observed(self, u: Array, seed: int | None = None) -> Solid:
+        setup = self.solid.setup(self.solid.design.truth)
+        rng = np.random.default_rng(self.seed if seed is None else seed)
+        return self._with(self.data.synthesized(u, setup, rng))
+
+    def load_cases(self) -> list[Problem]:
+        """Each includes the whole of alpha Phi."""
+        cases = len(self.solid.directions)
+        return [self._with(self.data.single_case(case)) for case in range(cases)] if cases > 1 else []
+
+    def _with(self, data: DisplacementData) -> Solid:
+        other = copy.copy(self)  # shares the mesh and the compiled functions
+        other.data, other.solid = data, data.solid
+        other.n_state = data.solid.bc.n_u
+        return other
+
+    # --- output
+
+    def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:
+        """u, lam (n_nodes, 3) per load case; E, dJ/dE per cell if p are moduli, t and dJ/dt if it is the thickness;
+        dJ/dX per node if p is a shape.
+        """
+        solid, design, geometry = self.solid, self.solid.design, self.mesh.geometry
+        s, every, cases = solid.setup(p), np.arange(len(geometry.X)), len(solid.directions)
+        vectors = {"u": (u, s)} if lam is None else {"u": (u, s), "lambda": (lam, replace(s, load=0.0 * s.load))}
+        point_data, cell_data = {}, {}
+        for case in range(cases):
+            for name, (v, at) in vectors.items():
+                numbered = f"{name}_{case + 1}" if cases > 1 else name
+                point_data[numbered] = solid.displacements(v, at, case, every)
+        if design.field is not None:
+            name, cells = design.field, design.parameter_of_cell
+            value = np.exp(p) if self.log else p
+            by_value = gradient / value if self.log else gradient
+            cell_data = {name: value[cells], f"dJ_d{name}": by_value[cells]}
+        if design.moved_nodes is not None:
+            point_data["dJ_dX"] = np.zeros_like(s.X)
+            point_data["dJ_dX"][design.moved_nodes] = gradient.reshape(-1, geometry.dim)
+        return Fields(in_space(s.X), *geometry.for_meshio(), {k: in_space(v) for k, v in point_data.items()}, cell_data)
+
+    def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
+        x = self.parameters.position
+        return ParameterView() if x is None else ParameterView(dict(zip(AXES[: x.shape[1]], x.T, strict=True)))
+
+
+def in_space(x: Array) -> Array:
+    """Points or vectors (n, d) as (n, 3)."""
+    return np.pad(x, ((0, 0), (0, 3 - x.shape[1])))

@@ -1,0 +1,108 @@
+"""Options that all problems of solids have, and their validation."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Annotated, Literal
+
+from gradient_routes.problems.data.regularization import PHI_WIDTH
+from gradient_routes.problems.errors import InputError, check_applies
+from gradient_routes.problems.mechanics.design_variables import FIELDS, MATERIAL
+from gradient_routes.problems.mechanics.loaded_solid import Load
+
+MAX_COUNT = 10**7  # of cells, markers, layers
+LENGTHS = 1e-9, 1e9  # [m]
+
+LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
+Count = Annotated[int, "cells along every edge"]
+Along = Annotated[int | None, "cells along this axis [n]"]
+Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom: rollers, planes of symmetry"]
+Law = Annotated[LawName, "stored energy"]
+Nu = Annotated[float, "Poisson's ratio at small strain"]
+Derivatives = Annotated[Literal["ad", "hand"], "P, dP/dF, dP/dq by JAX or hand-derived in NumPy"]
+LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
+Noise = Annotated[float, "standard deviation added to a twin's data [m]"]
+Seed = Annotated[int, "of noise and markers"]
+Alpha = Annotated[float, "weight of Phi"]
+PhiWidth = Annotated[float, "jump of log E below which total variation is rounded"]
+MarkerCount = Annotated[int, "points measured instead, at random on `face`"]
+Components = Annotated[Literal["all", "in-plane"], "of a marker's displacement"]
+
+
+def check(who: str, o: SimpleNamespace, axes: str) -> None:
+    """Raises InputError for options (attributes of o) that are out of range or would be ignored; axes: xyz or xy."""
+    _check_counts(who, o, axes)
+    _check_applies(who, o, axes)
+    _check_numbers(who, o)
+    _check_unknown(who, o)
+
+
+def lengths(who: str, size: str, count: int) -> tuple[float, ...]:
+    """The `count` lengths [m] of `size`. Raises InputError."""
+    try:
+        L = [float(part) for part in str(size).split(",")]
+    except ValueError:
+        L = []
+    if len(L) == 1:
+        L *= count
+    low, high = LENGTHS
+    if len(L) != count or not all(low <= L_i <= high for L_i in L):
+        several, example = {3: ("three", "1,2,0.5"), 2: ("two", "1,2")}[count]
+        raise InputError(
+            f"{who}: size={size} - give one length or {several}, such as {example}, from {low:g} to {high:g} m"
+        )
+    return tuple(L)
+
+
+def _check_counts(who: str, o: SimpleNamespace, axes: str) -> None:
+    along = [f"n{axis}" for axis in axes]
+    for name in ("n", *along, "layers", "cases", "markers", "seed"):
+        count, least = getattr(o, name), 0 if name in ("markers", "seed") else 1
+        if count is not None and count < least:
+            raise InputError(f"{who}: {name}={count} - choose {name} >= {least}")
+    if o.cases > len(axes):
+        order = ", ".join([axes[-1], *axes[:-1]])
+        raise InputError(f"{who}: cases={o.cases} - there are 1 to {len(axes)}: along {order}")
+    greatest = max(math.prod(getattr(o, name) or o.n for name in along), o.markers, o.layers or 0)
+    if greatest > MAX_COUNT:
+        raise InputError(f"{who}: {greatest:g} cells, markers or layers - at most {MAX_COUNT:g}")
+
+
+def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
+    meshed, measured, gripped = o.mesh is not None, o.data not in (None, "twin"), o.load == "displacement"
+    counts = {"n": o.n != 4} | {f"n{axis}": getattr(o, f"n{axis}") for axis in axes}
+    element = o.element != ("hex8" if axes == "xyz" else "quad4")
+    check_applies(
+        who,
+        ("mesh", meshed, False, counts | {"size": o.size != "1"}),
+        ("mesh", meshed, False, {"element": element}),
+        ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
+        ("markers", o.markers > 0, False, {"sensors": o.sensors}),
+        ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
+        ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers}),
+        ("unknown=shape", o.unknown == "shape", True, {"surface": o.surface != "right"}),
+        ("load=displacement", gripped, True, {"displacement": o.displacement != 0.2}),
+        ("load=displacement", gripped, False, {"traction": o.traction != 0.2}),
+        ("phi=tv", o.phi == "tv", True, {"phi_width": o.phi_width != PHI_WIDTH}),
+        ("unknown=modulus or layers", o.unknown in FIELDS, True, {"phi": o.phi in ("tikhonov", "tv")}),
+        ("unknown=modulus or layers", o.unknown in FIELDS, True, {"parametrization": o.parametrization}),
+    )
+
+
+def _check_numbers(who: str, o: SimpleNamespace) -> None:
+    if not -1.0 < o.nu < 0.5 - 1e-9:
+        raise InputError(f"{who}: nu={o.nu:g} - the laws are compressible, choose -1 < nu < 0.5")
+    if not (math.isfinite(o.traction) and math.isfinite(o.displacement)):
+        raise InputError(f"{who}: traction={o.traction:g}, displacement={o.displacement:g} - choose finite ones")
+    if not 0 <= o.noise < math.inf or (o.noise and o.data != "twin"):
+        raise InputError(f"{who}: noise={o.noise:g} - choose noise >= 0, for synthetic data (data=twin) only")
+
+
+def _check_unknown(who: str, o: SimpleNamespace) -> None:
+    if o.unknown == "traction" and (o.load != "traction" or o.cases > 1):
+        raise InputError(
+            f"{who}: unknown=traction with load={o.load}, cases={o.cases} - it takes one case of load=traction"
+        )
+    if o.derivatives == "hand" and o.unknown not in MATERIAL:
+        raise InputError(f"{who}: derivatives=hand are by material constants, not by {o.unknown} - take derivatives=ad")
