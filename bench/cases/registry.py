@@ -133,6 +133,7 @@ def study_tables() -> dict[str, Table]:
 ORDER = (
     "bar",
     "block",
+    "plate",
     "advection",
     "fd-one-sided",
     "fd-central",

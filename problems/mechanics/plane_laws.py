@@ -15,16 +15,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.mechanics.materials import LAWS, Energy, MaterialLaw
 from gradient_routes.problems.mechanics.materials_numpy import NumpyMaterial
+from gradient_routes.problems.mechanics.solid_options import Kind
 from gradient_routes.problems.problem import Array
 
-Kind = Literal["plane-stress", "plane-strain", "axisymmetric"]
 IN_PLANE, HOOP = [0, 1, 3, 4], [0, 1, 8, 3, 4]  # flat positions in (3, 3) of the entries of H; u_y/r is in none
 E_33 = np.diag([0.0, 0.0, 1.0])
 CLOSE = 1e-9  # of |H|: after a step this small, another one is exact to rounding, in real and imaginary part
@@ -69,31 +69,32 @@ def plane_stress(W: Energy, T: Array) -> Energy:
     def at(H: Any, h: Any, q: Any) -> Any:
         return W((T @ H.ravel()).reshape(3, 3) + h * E_33, q)
 
-    def by_h(f: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda H, h, q: jax.jvp(lambda h: f(H, h, q), (h,), (jnp.ones_like(h),))[1]
+    def P_33(H: Any, h: Any, q: Any) -> Any:
+        return jax.jvp(lambda h: at(H, h, q), (h,), (jnp.ones_like(h),))[1]
 
-    P_33 = by_h(at)
-    A_3333 = by_h(P_33)
+    def stress_and_modulus(H: Any, h: Any, q: Any) -> tuple[Any, Any]:
+        """P_33 and A_3333."""
+        return jax.jvp(lambda h: P_33(H, h, q), (h,), (jnp.ones_like(h),))
 
     @jax.custom_jvp
     def thinning(H: Any, q: Any) -> Any:
-        def step(state: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-            h, _, k = state
-            h, size = newton_step(h, P_33(H, h, q), A_3333(H, h, q), jnp)
-            return h, size, k + 1
+        close = CLOSE * jnp.abs(H).max()
 
-        def far(state: tuple[Any, Any, Any]) -> Any:
-            return (state[1] > CLOSE * jnp.abs(H).max()) & (state[2] < AT_MOST)
+        def step(state: Any) -> Any:
+            h, size, _, k = state
+            return *newton_step(h, *stress_and_modulus(H, h, q), jnp), size, k + 1
+
+        def far(state: Any) -> Any:
+            return (state[2] > close) & (state[3] < AT_MOST)  # the last step but one was not small
 
         zero = jnp.zeros((), jnp.result_type(H, *q))
-        h, _, _ = jax.lax.while_loop(far, step, (zero, jnp.inf, 0))
-        return h - P_33(H, h, q) / A_3333(H, h, q)
+        return jax.lax.while_loop(far, step, (zero, jnp.inf, jnp.inf, 0))[0]
 
     @thinning.defjvp
     def _(primals: Any, tangents: Any) -> tuple[Any, Any]:
-        h = thinning(*primals)
+        (H, q), h = primals, thinning(*primals)
         dP_33 = jax.jvp(lambda H, q: P_33(H, h, q), primals, tangents)[1]
-        return h, -dP_33 / A_3333(primals[0], h, primals[1])
+        return h, -dP_33 / stress_and_modulus(H, h, q)[1]
 
     @jax.custom_jvp
     def condensed(H: Any, q: Any) -> Any:
@@ -146,13 +147,14 @@ def _plane_stress_by_hand(material: NumpyMaterial, T: Array) -> NumpyMaterial:
         points = np.broadcast_shapes(H.shape[:-2], *map(np.shape, q))
         H_3D = np.zeros((*points, 3, 3), np.result_type(H, *q))
         H_3D[..., :2, :2] = H
-        h, limit, size = H_3D[..., 2, 2], CLOSE * np.abs(H).max(axis=(-2, -1)), np.inf
-        for _ in range(AT_MOST):
-            P, A = material.P(H_3D, q)[..., 2, 2], material.A(H_3D, q)[..., 2, 2, 2, 2]
-            if not (size > limit).any():
-                h -= P / A
-                break
-            h[...], size = newton_step(h, P, A, np)
+        h, size, close = H_3D[..., 2, 2], np.array(np.inf), CLOSE * np.abs(H).max(axis=(-2, -1))
+        with np.errstate(all="ignore"):  # NaN is a result here, as in JAX
+            for _ in range(AT_MOST):
+                P, A = material.P(H_3D, q)[..., 2, 2], material.A(H_3D, q)[..., 2, 2, 2, 2]
+                if not (size > close).any():
+                    h -= P / A
+                    break
+                h[...], size = newton_step(h, P, A, np)
         return H_3D
 
     def moduli(A: Array) -> Array:

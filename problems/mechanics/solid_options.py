@@ -15,6 +15,7 @@ MAX_COUNT = 10**7  # of cells, markers, layers
 LENGTHS = 1e-9, 1e9  # [m]
 
 LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
+Kind = Literal["plane-stress", "plane-strain", "axisymmetric"]
 Count = Annotated[int, "cells along every edge"]
 Along = Annotated[int | None, "cells along this axis [n]"]
 Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom: rollers, planes of symmetry"]
