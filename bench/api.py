@@ -172,7 +172,7 @@ def invert(
     at: str = "start",
     optimizer: Name = "lbfgs",
     iterations: int = 200,
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-9,
     positive: Positive = "none",
     rate: float = 0.1,
     **solver: Unpack[SolverOptions],
@@ -181,7 +181,7 @@ def invert(
 
     optimizer   "lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent" or "adam"
     iterations  at most
-    tolerance   ends where |dJ/dp| is so much of that at the start
+    tolerance   ends where |dJ/dp|, per natural change of p, is so much of 1/2 |d|^2; without data, of its first
     positive    "log" or "softplus": what keeps a raw parameter > 0
     rate        of adam's steps, in natural changes of p
 
@@ -190,7 +190,7 @@ def invert(
 
     >>> found = invert("bar", optimizer="gauss-newton")
     >>> found.end
-    'converged: |dJ/dp| is 1e-08 of that at the start, confirmed by 4 forward solves'
+    'converged: |dJ/dp| is 1e-09 of 1/2 |d|^2, confirmed by 4 forward solves'
     >>> float(abs(found.p - found.truth)[:5].max()) < 1e-6  # what lies behind the last sensor is not seen
     True
 

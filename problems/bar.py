@@ -72,6 +72,7 @@ class Bar(Problem):
         n: Annotated[int, "number of elements N"] = 8,
         sensors: Annotated[Nodes | None, "5: nodes 1 to 5; 1,3,5 or 2..6 or 5..5: these; 0: none [the first 5]"] = None,
         parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
+        modulus: Annotated[float | None, "E of the start [Pa] [1; fitted to the data of a file]"] = None,
         data: Annotated[str | None, "CSV file of measurements, columns node,displacement [synthetic]"] = None,
         noise: Annotated[float, "standard deviation added to synthetic data [m]"] = 0.0,
         seed: Annotated[int, "of that noise"] = 0,
@@ -90,6 +91,8 @@ class Bar(Problem):
         self.regularization.check("bar")
         if not (noise >= 0 and math.isfinite(noise)):
             raise InputError(f"bar: noise={noise:g} - a standard deviation is finite and >= 0")
+        if modulus is not None and not 1e-30 <= modulus <= 1e30:
+            raise InputError(f"bar: modulus={modulus:g} Pa - choose one from 1e-30 to 1e30")
         if seed < 0:
             raise InputError(f"bar: seed={seed} - choose seed >= 0")
         if data is not None and noise > 0:
@@ -109,9 +112,11 @@ class Bar(Problem):
             S = cumulative_sum(self.L_e / (A * true_modulus(self.x)))
             d = (self._tip_load(S[-1])[0] * S)[nodes - 1]
             self.sensors = Sensors(nodes, d + noise * np.random.default_rng(seed).standard_normal(len(nodes)))
+        E = 1.0 if modulus is None else modulus
+        self.start_from_data = data is not None and modulus is None
         self.parameters = Parameters(
-            start=np.zeros(n) if self.log else np.ones(n),
-            scale=np.ones(n),
+            start=np.full(n, math.log(E) if self.log else E),
+            scale=np.full(n, 1.0 if self.log else E),
             lower=-THETA_MAX if self.log else 0.0,
             upper=THETA_MAX if self.log else math.exp(THETA_MAX),
             unit="log Pa" if self.log else "Pa",
@@ -137,6 +142,15 @@ class Bar(Problem):
         other = copy(self)
         other._set_stop(stop)
         other.notes = other._notes()
+        return other
+
+    def scaled(self, p: Array, factor: float) -> Array:
+        return p + math.log(factor) if self.log else factor * p
+
+    def stiffened(self, factor: float) -> Bar:
+        other, q = copy(self), self.parameters
+        scale = q.scale if self.log else factor * q.scale
+        other.parameters = replace(q, start=self.scaled(q.start, factor), scale=scale)
         return other
 
     def tip(self, u: Array) -> float:

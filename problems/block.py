@@ -47,6 +47,7 @@ class Block(Solid):
         loaded: Annotated[str, "face loaded or gripped"] = "top",
         law: options.Law = "neo-hookean",
         nu: options.Nu = 0.3,
+        modulus: options.Modulus = None,
         derivatives: options.Derivatives = "ad",
         unknown: Annotated[DesignName, "what p is"] = "modulus",
         parametrization: Annotated[Literal["log", "raw"] | None, "of moduli: p = log E or p = E [log]"] = None,

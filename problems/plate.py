@@ -59,6 +59,7 @@ class Plate(Solid):
         loaded: Annotated[str, "edge loaded or gripped"] = "top",
         law: options.Law = "neo-hookean",
         nu: options.Nu = 0.3,
+        modulus: options.Modulus = None,
         derivatives: options.Derivatives = "ad",
         unknown: Annotated[PlaneDesign, "what p is"] = "modulus",
         parametrization: Annotated[

@@ -228,6 +228,7 @@ class Problem:
     stop       of a state that meets an obstacle: the contact law, None where there is none
     typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
                no one in particular
+    start_from_data  whether the start of p says nothing of the body that was measured: its size comes from the data
     notes      sentences a user should read beside the result
     """
 
@@ -245,6 +246,7 @@ class Problem:
     regularization: Prior | None = None
     stop: Stop | None = None
     typical: int | None = None
+    start_from_data: bool = False
     notes: tuple[str, ...] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -302,6 +304,16 @@ class Problem:
         other = copy.copy(self)
         other.regularization = replace(self.regularization, alpha=alpha)
         return other
+
+    def scaled(self, p: Array, factor: float) -> Array | None:
+        """The parameters (n_p,) of a body `factor` times as stiff as that of p: under the same loads a small u is
+        1 / factor times that of p. None where p sets no stiffness, or where u does not depend on it.
+        """
+        return None
+
+    def stiffened(self, factor: float) -> Problem:
+        """This problem, its data and its mesh, from a start that is `factor` times as stiff."""
+        raise NotOffered(f"{self.name}: its start has no stiffness to multiply")
 
     def candidates(self) -> Candidates | None:
         """What sensors can read; None: any unknown of the state."""

@@ -16,6 +16,7 @@ from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters, Problem
+from gradient_routes.routes.measured_start import with_measured_start
 from gradient_routes.routes.route import Route
 from gradient_routes.routes.synthetic_data import with_synthetic_data
 
@@ -25,7 +26,7 @@ MOST = 100_000  # cases of one command, unless its user allows more
 
 @dataclass(frozen=True)
 class ProblemSpec:
-    """A problem still to be built, its synthetic data, if it wants any, solved for.
+    """A problem still to be built, its synthetic data, if it wants any, solved for, its start fitted to measured ones.
 
     `build` is its factory, or Declared where it is built in other processes only: they find its code by its name.
     """
@@ -46,7 +47,7 @@ class ProblemSpec:
         problem = self.build(**self.options)
         if not isinstance(problem, Problem) or not isinstance(problem.parameters, Parameters):
             raise TypeError(f"its factory made a {type(problem).__name__}, not a Problem with Parameters")
-        return with_synthetic_data(problem)
+        return with_measured_start(with_synthetic_data(problem))
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def confirmed(objective: Objective, history: History, end: str, tolerance: float
     before = objective.forward_solves
     remarks = []
     for v in directions(objective):
-        claim = tolerance * objective.slope_0 * norm2(v)
+        claim = tolerance * objective.slope_scale * norm2(v)
         if not doubted and flat(objective, v, claim):
             continue
         seen = examined(objective, objective.accepted, v)

@@ -39,7 +39,7 @@ def explained(objective: Objective) -> str:
         )
     if found.noise > ROUNDED * EPS * abs(J) and found.hidden:
         return f"noise of J, about {found.noise:.2g}, hides a slope of {-found.promised:.2g}{_if_loose(objective)}"
-    if found.hidden or J == 0.0 or abs(found.promised) < math.sqrt(EPS) * objective.slope_0:
+    if found.hidden or J == 0.0 or abs(found.promised) < math.sqrt(EPS) * objective.slope_scale:
         return f"{AT_MINIMUM}: what is left of the slope is rounding"
     return f"no step was found, though J falls by {-found.promised:.2g} as the gradient says - use another optimizer"
 

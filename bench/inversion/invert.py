@@ -19,16 +19,18 @@ from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
-from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
-from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, optimizer
+from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective, observed
+from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, converged, flat, optimizer
 from gradient_routes.bench.inversion.variables import Positive, Variables
 from gradient_routes.problems.errors import RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
+from gradient_routes.routes.measured_start import fitted_factor, small_strain_factor
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Options
 from gradient_routes.routes.sensitivity import Sensitivity
 
+FAR = 10.0  # times too soft or too stiff: a start from which an optimizer of size one has far to go
 SHARED = tuple(column.name for column in RUN)
 
 
@@ -147,6 +149,9 @@ def invert(
 
     problem = made or spec()
     p_0 = point(problem, at)
+    says = None
+    if start is None:
+        problem, p_0, says = of_the_size_of_data(problem, p_0, engine.solver)
     p = p_0 if start is None else problem.parameters.check(start, f"{problem.name}, resumed")
     objection = route.route.objection(problem, **route.options)
     if objection is not None:
@@ -160,9 +165,11 @@ def invert(
         try:
             found = objective.start(p)
             doubt = objective.doubt()
-            history.take(found, doubt)
+            history.take(found, "; ".join(filter(None, (says, doubt))) or None)
             if objective.slope_0 == 0.0:
                 end = "converged: dJ/dp is 0 at the start"
+            elif flat(objective, found, engine.limits):
+                end = converged(objective, engine.limits)
             else:
                 end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
         except Stopped as ended:
@@ -179,6 +186,7 @@ def invert(
             end, interrupted = f"{end}; not confirmed: interrupted", True
     if end.startswith(MISLED):
         end += f" - see {checked_by(spec, route, at)}"
+    seen = observed(problem, p)
     last, ending = history.last, objective.forward_solves - history.iterates[-1].forward_solves
     assert last is not None
     try:
@@ -207,9 +215,24 @@ def invert(
         stop,
         ending,
         interrupted,
-        variables.warning(data(problem, last.p)),
+        variables.warning(None if seen is None else seen.data),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
     )
+
+
+def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Problem, Array, str | None]:
+    """The problem and p from a stiffness that the data fit best, where p is more than a decade off; and what to say."""
+    model = Model(problem, solver)
+    if Offers.SOLVE not in problem.offers or problem.scaled(p, 1.0) is None:
+        return problem, p, None
+    about = small_strain_factor(model, p)
+    if about is None or 1.0 / FAR <= about <= FAR:
+        return problem, p, None
+    c = fitted_factor(model, p)
+    q = None if c is None else problem.scaled(p, c)
+    if c is None or q is None:
+        return problem, p, None
+    return problem.stiffened(c), q, f"the start is made {c:.3g} times as stiff, which fits the data best"
 
 
 def stopped(objective: Objective, says: str) -> Stop:
@@ -221,15 +244,6 @@ def checked_by(spec: ProblemSpec, route: RouteSpec, at: str) -> str:
     """The command that judges the gradient."""
     words = ["routes", "check", "--problem", spec.selector, "--route", route.selector]
     return shlex.join(words if at == "start" else [*words, "--at", at])
-
-
-def data(problem: Problem, p: Array) -> Array | None:
-    """The measured data, (m,)."""
-    try:
-        seen = problem.observation(problem.initial(p), p)
-    except RoutesError:
-        return None
-    return None if seen is None else seen.data
 
 
 def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = True) -> ParameterView:

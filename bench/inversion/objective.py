@@ -10,7 +10,8 @@ import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.variables import Variables
-from gradient_routes.problems.errors import DomainError, NotConverged, Overflow, SingularMatrix
+from gradient_routes.problems.data.observation import Observation
+from gradient_routes.problems.errors import DomainError, NotConverged, Overflow, RoutesError, SingularMatrix
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
@@ -38,6 +39,20 @@ class Evaluation:
     lam: Array | None = None
 
 
+def observed(problem: Problem, p: Array) -> Observation | None:
+    """The data term at u_0, the state that solves start from."""
+    try:
+        return problem.observation(problem.initial(p), p)
+    except RoutesError:
+        return None
+
+
+def size_of_data(problem: Problem, p: Array) -> float:
+    """1/2 |d - S u_0|^2, which no start changes; 0 where J is no sum of squares."""
+    seen = observed(problem, p)
+    return 0.0 if seen is None else 0.5 * float(np.sum((seen.data - seen.predicted) ** 2))
+
+
 class Objective:
     """x -> (J / J_0, dJ/dx / J_0) by a route, J_0 the value at the start: numbers near one.
 
@@ -51,6 +66,7 @@ class Objective:
         self.begun = time.perf_counter()
         self.tried: list[Evaluation] = []  # since the last accepted step
         self.J_0, self.slope_0 = 1.0, 0.0  # J and |dJ/dx| at the start
+        self.slope_scale = 0.0  # what |dJ/dx| is called small against, for a natural change of p
         self.evaluations = 0
         self._options = options
         self._gradient: Any = None
@@ -62,6 +78,7 @@ class Objective:
         self._gradient = self.route.prepare(self.model, p, **options)
         first = self._accepted = self._evaluate(self.variables.x(p))
         self.J_0, self.slope_0 = abs(first.J) or 1.0, norm2(first.by_x)
+        self.slope_scale = size_of_data(self.problem, p) or self.slope_0
         return first
 
     def with_solver(self, solver: Solver) -> Objective:

@@ -23,10 +23,10 @@ SPENT = 1  # status of SciPy's minimizers: the iterations are used up; any other
 
 @dataclass(frozen=True)
 class Limits:
-    """iterations at most; tolerance on |dJ/dx| relative to the start; rate of the steps of adam."""
+    """iterations at most; tolerance on |dJ/dx| relative to 1/2 |d|^2 or the start; rate of the steps of adam."""
 
     iterations: int = 200
-    tolerance: float = 1e-8
+    tolerance: float = 1e-9
     rate: float = 0.1
 
 
@@ -43,10 +43,19 @@ def accept(objective: Objective, history: History, limits: Limits, x: Array) -> 
         raise Stopped(f"J falls without bound: J = {found.J:.3g} after {objective.J_0:.3g} - it is no sum of squares")
     if found.J > DIVERGED * objective.J_0:
         raise Stopped(f"diverging: J = {found.J:.3g} is {found.J / objective.J_0:.3g} times that of the start")
-    if norm2(found.by_x) <= limits.tolerance * objective.slope_0:
-        raise Stopped(f"converged: |dJ/dp| is {limits.tolerance:g} of that at the start")
+    if flat(objective, found, limits):
+        raise Stopped(converged(objective, limits))
     if history.error_bar.hides(found):
         raise Stopped(history.error_bar.says)
+
+
+def flat(objective: Objective, found: Evaluation, limits: Limits) -> bool:
+    return norm2(found.by_x) <= limits.tolerance * objective.slope_scale
+
+
+def converged(objective: Objective, limits: Limits) -> str:
+    of = "that at the start" if objective.slope_scale == objective.slope_0 else "1/2 |d|^2"
+    return f"converged: |dJ/dp| is {limits.tolerance:g} of {of}"
 
 
 def minimized(objective: Objective, history: History, limits: Limits, options: Any, **method: Any) -> str:

@@ -22,6 +22,7 @@ AnyDesign = DesignName | PlaneDesign
 CELLWISE: tuple[AnyDesign, ...] = ("modulus", "thickness")
 FIELDS: tuple[AnyDesign, ...] = (*CELLWISE, "layers")
 MATERIAL: tuple[AnyDesign, ...] = (*FIELDS, "constants")
+MODULI: tuple[AnyDesign, ...] = ("modulus", "layers", "constants")
 MAX_DEFAULT_LAYERS = 4
 THETA_MAX = 300.0  # exp(THETA_MAX) and its square stay in float64's range
 
@@ -81,12 +82,12 @@ def _in_cube(x: Array) -> Array:
     return x if x.shape[-1] == 3 else np.insert(x, 1, 0.5, axis=-1)
 
 
-def moduli(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool) -> DesignVariables:
-    """One Young's modulus per cell. `uniform`: start from E = 1 instead of the default field."""
+def moduli(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, E: float) -> DesignVariables:
+    """One Young's modulus per cell. `uniform`: start from the modulus E instead of the default field of that size."""
     x = mesh.normalized(mesh.geometry.centres)
     start = np.ones(len(x)) if uniform else default_modulus(x)
     cells = np.arange(len(x))
-    return _cellwise(_moduli_q(law, nu), log, start, inclusion(x), cells, mesh.geometry.centres, "E")
+    return _cellwise(_moduli_q(law, nu), log, E, start, inclusion(x), cells, mesh.geometry.centres, "E")
 
 
 def thicknesses(mesh: Mesh, q: tuple[Any, ...], log: bool, uniform: bool) -> DesignVariables:
@@ -102,14 +103,16 @@ def thicknesses(mesh: Mesh, q: tuple[Any, ...], log: bool, uniform: bool) -> Des
         return tuple(c * (t / t_0) for c in q)
 
     centres = mesh.geometry.centres
-    return _cellwise(q_of, log, t_0 * start, t_0 * inclusion(x), cells, centres, "t", unit="m", scale=t_0)
+    return _cellwise(q_of, log, t_0, start, inclusion(x), cells, centres, "t", unit="m")
 
 
 def _moduli_q(law: MaterialLaw, nu: float) -> Callable[[Any], tuple[Any, ...]]:
     return lambda E: law.of_modulus(E, nu)
 
 
-def layers(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, count: int | None) -> DesignVariables:
+def layers(
+    mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, E: float, count: int | None
+) -> DesignVariables:
     """One Young's modulus per layer, of `count` layers of equal height; None: the most, up to 4, that all hold a cell.
 
     Raises InputError where a layer holds no cell's centre.
@@ -127,7 +130,7 @@ def layers(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, co
     middle[:, -1] = z = (np.arange(count) + 0.5) / count
     start = np.ones(count) if uniform else 1.0 + 0.3 * z
     position = mesh.bounding_box[0] + middle * (mesh.bounding_box[1] - mesh.bounding_box[0])
-    return _cellwise(_moduli_q(law, nu), log, start, inclusion(middle), layer, position, "E_layer")
+    return _cellwise(_moduli_q(law, nu), log, E, start, inclusion(middle), layer, position, "E_layer")
 
 
 def _layer_numbers(height: Array, count: int) -> Array:
@@ -142,15 +145,19 @@ def _empty_layers(height: Array, count: int) -> Array:
 def _cellwise(
     q_of: Callable[[Any], tuple[Any, ...]],
     log: bool,
+    size: float,
     start: Array,
     truth: Array,
     parameter_of_cell: Array,
     position: Array,
     name: str,
     unit: str = "Pa",
-    scale: float = 1.0,
 ) -> DesignVariables:
-    """A value v in each cell e, v[parameter_of_cell[e]], to which the constants q_of(v) are proportional."""
+    """A value v in each cell e, v[parameter_of_cell[e]], to which the constants q_of(v) are proportional.
+
+    start and truth are in units of `size`.
+    """
+    start, truth = size * start, size * truth
 
     def q(p: Any, xp: Any) -> tuple[Any, ...]:
         return q_of((xp.exp(p) if log else p)[parameter_of_cell])
@@ -160,7 +167,7 @@ def _cellwise(
 
     parameters = Parameters(
         start=np.log(start) if log else start,
-        scale=np.full(len(start), 1.0 if log else scale),
+        scale=np.full(len(start), 1.0 if log else size),
         lower=-THETA_MAX if log else 0.0,
         upper=THETA_MAX if log else np.inf,
         unit=f"log {unit}" if log else unit,
@@ -171,12 +178,12 @@ def _cellwise(
     return DesignVariables(parameters, lambda s, p, xp: replace(s, q=q(p, xp)), truth, q_p, name[0], parameter_of_cell)
 
 
-def constants(mesh: Mesh, law: MaterialLaw, nu: float) -> DesignVariables:
-    """The material constants, the same in every cell."""
-    start = np.array(law.of_modulus(1.0, nu))
+def constants(mesh: Mesh, law: MaterialLaw, nu: float, E: float) -> DesignVariables:
+    """The material constants, the same in every cell, from those of the modulus E."""
+    start = np.array(law.of_modulus(E, nu))
     parameters = Parameters(
         start=start,
-        scale=np.where(start == 0.0, 1.0, np.abs(start)),
+        scale=np.where(start == 0.0, E, np.abs(start)),
         lower=np.where(law.positive, 0.0, -np.inf),
         unit="Pa",
         label=lambda i: law.constants[i],

@@ -14,7 +14,7 @@ from gradient_routes.problems.data import probes
 from gradient_routes.problems.data.displacement_data import DisplacementData
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Phi, Prior
-from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.errors import InputError, NotOffered
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, held_components
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
@@ -23,6 +23,7 @@ from gradient_routes.problems.mechanics.design_variables import (
     CELLWISE,
     FIELDS,
     MATERIAL,
+    MODULI,
     AnyDesign,
     DesignVariables,
     Setup,
@@ -73,15 +74,16 @@ class Solid(Problem):
         if not moved.size:
             raise InputError(f"{self.name}: loaded={o.loaded}: all its nodes are clamped - choose another face")
         gripped = o.load == "displacement"
-        self.log, uniform = o.parametrization != "raw", o.data == "twin"
+        E, measured = o.modulus or 1.0, o.data not in (None, "twin")
+        self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
         amplitude, unit = (o.displacement, "m") if gripped else (o.traction, "Pa")
-        E = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
-        q = law.of_modulus(E, o.nu)
+        field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
+        q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
-            "modulus": lambda: design_variables.moduli(mesh, law, o.nu, self.log, uniform),
-            "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, o.layers),
+            "modulus": lambda: design_variables.moduli(mesh, law, o.nu, self.log, uniform, E),
+            "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, E, o.layers),
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
-            "constants": lambda: design_variables.constants(mesh, law, o.nu),
+            "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
             "traction": lambda: design_variables.tractions(mesh, top, o.traction),
             "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d(clamp, top.node_set)),
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
@@ -96,13 +98,14 @@ class Solid(Problem):
         self.affine = self.linear and o.unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
         self.matrix_free = not use_numpy
-        self.noise, self.seed, self.synthetic = o.noise, o.seed, uniform
+        self.noise, self.seed, self.synthetic = o.noise, o.seed, o.data == "twin"
         if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:
             self.notes += (f"nu={o.nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
         if amplitude == 0.0 and o.unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
-        if o.data is not None and o.data != "twin":
+        if measured:
             self.data = self._from_file(o.data)
+            self.start_from_data = o.modulus is None and o.unknown in MODULI and not gripped
         elif o.markers:
             in_plane = o.components == "in-plane"
             self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
@@ -197,6 +200,28 @@ class Solid(Problem):
         if unknown not in ("modulus", "thickness"):
             return finer, p
         return finer, prolongate(p, self.mesh.geometry.centres, finer.mesh.geometry.centres)
+
+    # --- a start of the size of the data
+
+    def scaled(self, p: Array, factor: float) -> Array | None:
+        """Where p sets the material, and a load is given rather than a displacement."""
+        if self._options["unknown"] not in MATERIAL or self.solid.load == "displacement":
+            return None
+        return p + np.log(factor) if self._is_log else factor * p
+
+    def stiffened(self, factor: float) -> Solid:
+        start, o = self.scaled(self.parameters.start, factor), self._options
+        if start is None:
+            raise NotOffered(f"{self.name}: unknown={o['unknown']} with load={o['load']} has no stiffness to multiply")
+        other = copy.copy(self)
+        scale = self.parameters.scale * (1.0 if self._is_log else factor)
+        other.parameters = replace(self.parameters, start=start, scale=scale)
+        other.regularization = other._prior(self.alpha, o["phi"], o["phi_width"], o["unknown"])
+        return other
+
+    @property
+    def _is_log(self) -> bool:
+        return self.log and self.solid.design.field is not None
 
     # --- synthetic data
 

@@ -21,6 +21,7 @@ Along = Annotated[int | None, "cells along this axis [n]"]
 Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom: rollers, planes of symmetry"]
 Law = Annotated[LawName, "stored energy"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
+Modulus = Annotated[float | None, "Young's, to start from or known [1; fitted to a file's data]"]
 Derivatives = Annotated[Literal["ad", "hand"], "P, dP/dF, dP/dq by JAX or hand-derived in NumPy"]
 LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
 Noise = Annotated[float, "standard deviation added to a twin's data [m]"]
@@ -94,6 +95,8 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
 def _check_numbers(who: str, o: SimpleNamespace) -> None:
     if not -1.0 < o.nu < 0.5 - 1e-9:
         raise InputError(f"{who}: nu={o.nu:g} - the laws are compressible, choose -1 < nu < 0.5")
+    if o.modulus is not None and not 1e-30 <= o.modulus <= 1e30:
+        raise InputError(f"{who}: modulus={o.modulus:g} Pa - choose one from 1e-30 to 1e30")
     if not (math.isfinite(o.traction) and math.isfinite(o.displacement)):
         raise InputError(f"{who}: traction={o.traction:g}, displacement={o.displacement:g} - choose finite ones")
     if not 0 <= o.noise < math.inf or (o.noise and o.data != "twin"):

@@ -13,7 +13,7 @@ from gradient_routes.bench.studies.options import PROBLEM
 
 DEFAULT = "advection[n=8,data=twin,noise=0.01,alpha=0.0001]"
 OPTIMIZERS = ["lbfgs", "descent"]
-TOLERANCE = "Ends where |dJ/dp| is this fraction of its value at the start."
+TOLERANCE = "Ends where |dJ/dp|, per natural change of p, is this fraction of 1/2 |d|^2; without data, of its first."
 QUESTION = ("problem", "route", "at", "optimizer")
 
 STUDY = Study(
@@ -34,7 +34,7 @@ STUDY = Study(
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help="How."),
         click.option("--iterations", type=COUNT, default=200, show_default=True, help="At most."),
-        click.option("--tolerance", type=FROM_ZERO, default=1e-8, show_default=True, help=TOLERANCE),
+        click.option("--tolerance", type=FROM_ZERO, default=1e-9, show_default=True, help=TOLERANCE),
         solver_options,
     ),
     tables={"consistency": Table(CONSISTENCY, QUESTION), "consistency_steps": Table(STEPS, QUESTION)},

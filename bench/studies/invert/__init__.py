@@ -14,7 +14,7 @@ from gradient_routes.bench.studies.options import problem_option
 POSITIVES = ["none", "log", "softplus"]
 OPTIMIZERS = ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 OPTIMIZER = "gauss-newton, levenberg-marquardt and trust use d(S u)/dp; descent is for comparison, adam for --minibatch"
-TOLERANCE = "Ends where |dJ/dp| is this fraction of its value at the start."
+TOLERANCE = "Ends where |dJ/dp|, per natural change of p, is this fraction of 1/2 |d|^2; without data, of its first."
 RAW = "How a raw parameter is kept > 0: its logarithm varies, or the argument of softplus."
 ALPHA_SWEEP = "J minimized at COUNT weights of Phi from LEAST to MOST: the L-curve."
 DRAWS = "The same for N draws of the noise: bias and variance against alpha."
@@ -46,7 +46,7 @@ STUDY = Study(
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help=OPTIMIZER),
         click.option("--iterations", type=COUNT, default=200, show_default=True, help="At most."),
-        click.option("--tolerance", type=FROM_ZERO, default=1e-8, show_default=True, help=TOLERANCE),
+        click.option("--tolerance", type=FROM_ZERO, default=1e-9, show_default=True, help=TOLERANCE),
         click.option(
             "--positive",
             type=click.Choice(POSITIVES),

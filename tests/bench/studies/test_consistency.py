@@ -23,7 +23,7 @@ WRONG = {"otd", "quadrature", "stabilization", "mesh"}
 
 def measured(problem: str = PROBLEM, routes=(TRUE, *INCONSISTENT), **engine) -> Consistency:
     (spec,) = case.problems([problem])
-    return consistency(spec, case.routes(routes), Engine(limits=engine.pop("limits", Limits(200, 1e-8)), **engine))
+    return consistency(spec, case.routes(routes), Engine(limits=engine.pop("limits", Limits(200, 1e-9)), **engine))
 
 
 @pytest.fixture(scope="module")

@@ -103,7 +103,7 @@ def test_raw_moduli_are_found_from_far_away(positive: str) -> None:
 
 def test_a_step_out_of_the_domain_comes_back_and_is_said(tmp_path: Path) -> None:
     """From moduli far too high the first steps of raw parameters overshoot below zero."""
-    (tmp_path / "p.csv").write_text("E\n" + "20\n" * 8)
+    (tmp_path / "p.csv").write_text("E\n" + "9\n" * 8)
     (spec,), (route,) = case.problems(["bar[parametrization=raw]"]), case.routes(["adjoint"])
     found = invert(spec, route, Engine(limits=TIGHT), at=str(tmp_path / "p.csv"))
     said = [step.says for step in found.iterates if step.says]
