@@ -18,6 +18,7 @@ from gradient_routes.problems.contact import GAP, K_C, STOP_WIDTH, Stop, StopNam
 from gradient_routes.problems.data.observation import Candidates, Observation, selection
 from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
 from gradient_routes.problems.data.sensors import Nodes, Sensors, parse_nodes, read_sensors
+from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.tridiagonal import (
     BorderedTridiagonal,
@@ -73,8 +74,12 @@ class Bar(Problem):
         sensors: Annotated[Nodes | None, "5: nodes 1 to 5; 1,3,5 or 2..6 or 5..5: these; 0: none [the first 5]"] = None,
         parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
         modulus: Annotated[float | None, "E of the start [Pa] [1; fitted to the data of a file]"] = None,
-        data: Annotated[str | None, "CSV file of measurements, columns node,displacement [synthetic]"] = None,
-        noise: Annotated[float, "standard deviation added to synthetic data [m]"] = 0.0,
+        data: Annotated[str | None, "file of measurements, columns node,displacement [synthetic]"] = None,
+        columns: Annotated[str | None, "of the file, node:NAME,displacement:NAME [by its header]"] = None,
+        units: Annotated[str | None, "of the file's displacement, such as mm [the header's, else m]"] = None,
+        noise: Annotated[
+            float | str | None, "standard deviation of a file's data, added to others [m], or 0.4um"
+        ] = None,
         seed: Annotated[int, "of that noise"] = 0,
         alpha: Annotated[float, "weight of Phi"] = 0.0,
         phi: Annotated[FieldPhi, "1/2 |D log E|^2, D between neighbours, or total variation of log E"] = "tikhonov",
@@ -89,14 +94,12 @@ class Bar(Problem):
         check_applies("bar", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != PHI_WIDTH}))
         self.regularization = Prior(alpha, phi, phi_width)
         self.regularization.check("bar")
-        if not (noise >= 0 and math.isfinite(noise)):
-            raise InputError(f"bar: noise={noise:g} - a standard deviation is finite and >= 0")
         if modulus is not None and not 1e-30 <= modulus <= 1e30:
             raise InputError(f"bar: modulus={modulus:g} Pa - choose one from 1e-30 to 1e30")
+        check_applies("bar", ("data=FILE", data is not None, True, {"columns": columns, "units": units}))
+        sigma = standard_deviation(noise, data is not None, "bar")
         if seed < 0:
             raise InputError(f"bar: seed={seed} - choose seed >= 0")
-        if data is not None and noise > 0:
-            raise InputError("bar: noise= is added to synthetic data only - drop it or drop data=")
         self.n, self.n_state, self.structure = n, n, "spd"
         self._set_stop(make_stop(stop, gap, k_c, width, "bar"))
         self.log = parametrization == "log"
@@ -104,14 +107,15 @@ class Bar(Problem):
         self.f = np.zeros(n)  # [N]
         self.f[-1] = F
         self.x = (np.arange(n) + 0.5) * self.L_e  # element centres [m]
-        self.synthetic, self.noise = data is None, noise
+        self.synthetic, self.noise = data is None, sigma
         if data is not None:
-            self.sensors = read_sensors(data, n, sensors, "bar")
+            measured = read_sensors(data, n, sensors, "bar", columns, units, sigma)
+            self.sensors, self.noise, self.read_as = measured.sensors, measured.sigma, measured.notes
         else:
             nodes = parse_nodes(min(5, n) if sensors is None else sensors, n, "bar")
             S = cumulative_sum(self.L_e / (A * true_modulus(self.x)))
             d = (self._tip_load(S[-1])[0] * S)[nodes - 1]
-            self.sensors = Sensors(nodes, d + noise * np.random.default_rng(seed).standard_normal(len(nodes)))
+            self.sensors = Sensors(nodes, d + sigma * np.random.default_rng(seed).standard_normal(len(nodes)))
         E = 1.0 if modulus is None else modulus
         self.start_from_data = data is not None and modulus is None
         self.parameters = Parameters(
@@ -178,7 +182,7 @@ class Bar(Problem):
             notes = ["no sensors: J has no data term, its data gradient is exactly 0"]
         if stop is not None and stop.gap < 0:
             notes += [f"gap={stop.gap:g} < 0: the stop presses on the tip of the unloaded bar"]
-        return tuple(notes)
+        return (*notes, *self.read_as)
 
     def _tip_load(self, C: Any) -> tuple[Any, Any]:
         """T = F - q, the axial force of a bar of compliance C [m/N] in equilibrium with the stop, and dT/dC."""

@@ -230,6 +230,7 @@ class Problem:
                no one in particular
     start_from_data  whether the start of p says nothing of the body that was measured: its size comes from the data
     notes      sentences a user should read beside the result
+    read_as    those of them that say how a data file was read
     """
 
     name: str
@@ -248,6 +249,7 @@ class Problem:
     typical: int | None = None
     start_from_data: bool = False
     notes: tuple[str, ...] = ()
+    read_as: tuple[str, ...] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

@@ -110,7 +110,7 @@ def sensitivities(model: Model, state: State, components: Array | None = None) -
     dSu_dp = seen.S_u @ du_dp
     if seen.S_p is not None:
         dSu_dp = dSu_dp + np.stack([seen.S_p @ (np.arange(n_p) == i).astype(float) for i in at], axis=1)
-    return Sensitivities(at, du_dp, np.asarray(dSu_dp) / seen.weight)
+    return Sensitivities(at, du_dp, np.asarray(dSu_dp) / np.reshape(seen.weight * seen.relative, (-1, 1)))
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,8 @@ def sensitivities(model: Model, state: State, columns: Columns) -> Sensitivities
     values = seen.S_u @ du_dp
     if seen.S_p is not None:
         values = values + seen.S_p @ np.eye(len(state.p))[:, chosen]
-    return Sensitivities("dSu_dp", [*map(seen.label, range(len(seen.data)))], labels, units, values / seen.weight)
+    values = values / np.reshape(seen.weight * seen.relative, (-1, 1))
+    return Sensitivities("dSu_dp", [*map(seen.label, range(len(seen.data)))], labels, units, values)
 
 
 def with_columns(fields: Fields, problem: Problem, state: State | None, model: Model, columns: Columns) -> Fields:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gradient_routes.bench.ranges import SECONDS
+from gradient_routes.bench.studies.data_options import Command, data_options
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +21,13 @@ if TYPE_CHECKING:
 PROBLEM = "NAME, 'NAME[key=value]' or FILE.py:NAME: one problem."
 BUDGET = "Skip what is predicted to take more seconds; inf forces it."
 
-problem_option = click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM)
+
+def problem_option(command: Command) -> Command:
+    """--problem, and how it reads its data."""
+    given = click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM)
+    return given(data_options(command))
+
+
 budget_option = click.option("--budget", type=SECONDS, default=60.0, show_default=True, help=BUDGET)
 
 

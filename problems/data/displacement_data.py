@@ -71,14 +71,13 @@ class DisplacementData:
         d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
         measured, cases = self.probes.measured, range(len(d))
         S_u, S_a = self._sampling_matrix
-        return Observation(
-            np.concatenate([self.probes.read(U[case])[measured] for case in cases]),
-            np.concatenate([d[case][measured] for case in cases]),
-            S_u,
-            S_a if self.solid.grip_is_parameter else None,
-            self.noise,
-            self._label,
-        )
+        predicted = np.concatenate([self.probes.read(U[case])[measured] for case in cases])
+        data = np.concatenate([d[case][measured] for case in cases])
+        S_p = S_a if self.solid.grip_is_parameter else None
+        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label)
+        if self.probes.weights is None:
+            return seen
+        return seen.weighted(np.tile(self.probes.weights[measured], len(d)))
 
     def candidates(self) -> Candidates:
         """Every free displacement component of every node, in every load case."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,21 @@ class Observation:
     sigma: float = 0.0
     label: Callable[[int], str] = str
     weight: float = 1.0
+    relative: Array | float = 1.0
+
+    def weighted(self, w: Array) -> Observation:
+        """With factors w (m,), by which J weights the data; those of equal accuracy have one sigma then."""
+        from scipy import sparse
+
+        rows = sparse.diags_array(w).tocsr()
+        return replace(
+            self,
+            predicted=w * self.predicted,
+            data=w * self.data,
+            S_u=rows @ self.S_u,
+            S_p=None if self.S_p is None else rows @ self.S_p,
+            relative=w * self.relative,
+        )
 
 
 @dataclass(frozen=True)

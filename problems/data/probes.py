@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.data.csv import read_columns
+from gradient_routes.problems.data.placing import Outside, place
+from gradient_routes.problems.data.repeats import without_repeats
+from gradient_routes.problems.data.table import Group, Table, read_table
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import BRICKS
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.problem import Array
-
-OUTSIDE_TOLERANCE = 1e-3  # of the diameter: distance outside the mesh that is attributed to rounded coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,24 +23,29 @@ class Probes:
     nodes (m, k), N (m, k)  a point's displacement is sum_k N_k u(node_k)
     x (m, d)                the points [m]
     measured (m, d)         which components are measured
+    weights (m, d)          of the misfits in J, relative to their mean accuracy; None: 1
     """
 
     nodes: Array
     N: Array
     x: Array
     measured: Array
+    weights: Array | None = None
 
     def read(self, U: Any) -> Any:
         """(m, d) [m], from the nodes' displacements U (m, k, d)."""
         return (self.N[..., None] * U).sum(1)
 
     def misfit(self, U: Any, d: Any) -> Any:
-        """1/2 |S u - d|^2 over what is measured, holomorphic."""
-        return 0.5 * ((self.read(U) - d)[self.measured] ** 2).sum()
+        """1/2 |w (S u - d)|^2 over what is measured, holomorphic."""
+        r = self.read(U) - d
+        return 0.5 * ((r if self.weights is None else self.weights * r)[self.measured] ** 2).sum()
 
     def misfit_gradient(self, U: Array, d: Array) -> Array:
         """Derivative of the misfit with respect to U, (m, k, d)."""
         r = np.where(self.measured, self.read(U) - d, 0.0)
+        if self.weights is not None:
+            r = self.weights**2 * r
         return np.asarray(self.N[..., None] * r[:, None])
 
 
@@ -69,29 +74,70 @@ def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Pro
     return Probes(nodes, N, np.einsum("ma,mai->mi", N, geometry.X[nodes]), measured)
 
 
-def read_probes(mesh: Mesh, path: str) -> tuple[Probes, Array]:
-    """Probes and data (m, d) [m] of a file with columns x,y,z,ux,uy,uz (x,y,ux,uy of a plane body).
+@dataclass(frozen=True)
+class Measured:
+    """What a file holds: probes, data d (m, d) [m], noise sigma [m], 0 if unknown, and notes on how it was read."""
 
-    An empty cell was not measured.
+    probes: Probes
+    d: Array
+    sigma: float
+    notes: tuple[str, ...]
 
-    Raises InputError for points outside the body, naming the row.
+
+def read_probes(
+    mesh: Mesh,
+    path: str,
+    columns: str | None = None,
+    units: str | None = None,
+    outside: Outside = "refuse",
+    noise: float = 0.0,
+) -> Measured:
+    """Read x,y,z and any of ux,uy,uz, of a plane body x,y and ux,uy; an empty cell was not measured.
+
+    See `read_table` and `place`. The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y, sigma_z, by
+    which data are then weighted.
+    Raises InputError for a file that cannot be understood, and for points outside the body.
     """
     axes = AXES[: mesh.geometry.dim]
-    measures = tuple(f"u{axis}" for axis in axes)
-    columns = read_columns(path, (*axes, *measures), optional=measures)
-    x, d = (np.stack([columns[name] for name in names], axis=1) for names in (axes, measures))
-    if not len(x) or np.isnan(d).all():
+    ux = Group(tuple(f"u{axis}" for axis in axes), "length", need="any", gaps=True)
+    deviations = Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True)
+    table = read_table(path, (Group(tuple(axes), "length", marked=False), ux, deviations), columns, units)
+    x, d = table.stack(axes), table.stack(ux.names)
+    if np.isnan(d).all():
         raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
-    cells, xi, outside = mesh.geometry.locate(x)
-    extent = np.ptp(mesh.geometry.X[mesh.geometry.nodes[cells]], axis=1).max(axis=1)
-    bad = np.flatnonzero(outside * extent > OUTSIDE_TOLERANCE * mesh.diameter)
-    if bad.size:
-        i, (low, high) = int(bad[0]), mesh.bounding_box
-        where, span = (", ".join(f"{value:g}" for value in values) for values in (x[i], high - low))
-        raise InputError(
-            f"{path}: data row {i + 1} at ({where}) lies outside {mesh.who}, whose box of {span} m begins at"
-            f" ({', '.join(f'{v:g}' for v in low)}) ({bad.size} of {len(x)} rows do) - check coordinates and units"
-        )
-    N, _ = mesh.geometry.element.shape_functions(xi.T)
+    sigma = noise_of(table, axes, d, noise)
+    kept, repeated = without_repeats(path, x, d, table.lines, sigma)
+    placed = place(mesh, x[kept], path, outside)
+    rows = np.flatnonzero(kept)[placed.rows]
+    d, weights = d[rows], None
     measured = ~np.isnan(d)
-    return Probes(mesh.geometry.nodes[cells], N, x, measured), np.where(measured, d, 0.0)
+    if isinstance(sigma, np.ndarray):
+        level = float(np.mean(sigma[rows][measured] ** -2.0) ** -0.5)
+        weights = level / np.where(measured, sigma[rows], level)
+        sigma = level
+    probes = Probes(placed.nodes, placed.N, placed.x, measured, weights)
+    notes = tuple(filter(None, (table.said, repeated, *placed.said)))
+    return Measured(probes, np.where(measured, d, 0.0), sigma, notes)
+
+
+def noise_of(table: Table, axes: str, d: Array, noise: float) -> Array | float:
+    """sigma (m, d) [m] of the data by columns, or `noise`. Raises InputError unless columns are positive."""
+    single = [f"sigma_{axis}" for axis in axes]
+    given = [name for name in ("sigma", *single) if name in table.columns]
+    if not given:
+        return noise
+    if noise:
+        raise InputError(f"{table.path}: noise={noise:g} and column {given[0]} both state the noise - keep one")
+    if "sigma" in given and len(given) > 1:
+        raise InputError(f"{table.path}: columns {', '.join(given)} state the noise twice - keep one")
+    sigma = table.stack(["sigma"] * len(axes) if "sigma" in given else single)
+    bad = np.flatnonzero((~np.isnan(d) & ~(sigma > 0.0)).any(axis=1))
+    if bad.size:
+        i = int(bad[0])
+        c = int(np.flatnonzero(~np.isnan(d[i]) & ~(sigma[i] > 0.0))[0])
+        has = "none" if np.isnan(sigma[i, c]) else f"{sigma[i, c]:g} m"
+        raise InputError(
+            f"{table.path}: line {table.lines[i]}: the noise of u{axes[c]} is {has}, in {bad.size} rows"
+            f" in all it is not above 0 - give a standard deviation > 0 of every value"
+        )
+    return sigma

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.data.csv import read_columns
+from gradient_routes.problems.data.repeats import without_repeats
+from gradient_routes.problems.data.table import Group, Table, read_table
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
 Nodes = str | int | Sequence[int]
+NODE = Group(("node",), "number", marked=False)
+DISPLACEMENT = Group(("displacement",), "length")
+NOISE = Group(("sigma",), "length", need="none")
 
 
 @dataclass(frozen=True)
@@ -97,28 +101,63 @@ def _nodes_from_text(text: str, n: int, who: str) -> int | list[int]:
     return nodes
 
 
-def read_sensors(path: str | Path, n: int, nodes: Nodes | None, who: str) -> Sensors:
-    """Read measured data (columns `node,displacement`); `nodes` picks some of the rows, None takes all.
+@dataclass(frozen=True)
+class Measured:
+    """What a file holds: sensors, their noise sigma [m], 0 if unknown, and notes on how it was read."""
 
+    sensors: Sensors
+    sigma: float
+    notes: tuple[str, ...]
+
+
+def read_sensors(
+    path: str | Path,
+    n: int,
+    nodes: Nodes | None,
+    who: str,
+    columns: str | None = None,
+    units: str | None = None,
+    noise: float = 0.0,
+) -> Measured:
+    """Read measured data (columns `node,displacement`, see `read_table`); `nodes` picks some of the rows, None all.
+
+    The noise is `noise` [m], or that of a column sigma.
     Raises InputError for a node that does not exist, is given twice, or is asked for and not in the file.
     """
-    columns = read_columns(path, ("node", "displacement"))
-    node, d = columns["node"], columns["displacement"]
-    if not node.size:
-        raise InputError(f"{path}: has a header and no rows - add one row a sensor")
-    for line, value in enumerate(node, start=2):
-        if value != int(value) or not 1 <= value <= n:
-            raise InputError(
-                f"{path}: data row {line - 1} is of node {value:g}, {who} has nodes 1..{n} - correct the row"
-            )
-    at = {int(value): k for k, value in enumerate(node)}
-    if len(at) < len(node):
-        twice = next(int(v) for k, v in enumerate(node) if at[int(v)] != k)
-        raise InputError(f"{path}: node {twice} is given twice - keep one row a node")
+    table = read_table(path, (NODE, DISPLACEMENT, NOISE), columns, units)
+    node, d = table.columns["node"], table.columns["displacement"]
+    odd = np.flatnonzero((node != np.floor(node)) | (node < 1) | (node > n))
+    if odd.size:
+        row, value = odd[0] + 1, node[odd[0]]
+        raise InputError(f"{path}: data row {row} is of node {value:g}, {who} has nodes 1..{n} - correct the row")
+    keep, repeated = without_repeats(path, node[:, None], d[:, None], table.lines, what="node")
+    sigma = _level(table, noise, who)
+    notes = tuple(filter(None, (table.said, repeated)))
+    node, d = node[keep].astype(np.int64), d[keep]
     if nodes is None:
-        return Sensors(node.astype(np.int64), d)
+        return Measured(Sensors(node, d), sigma, notes)
+    at = {int(value): k for k, value in enumerate(node)}
     chosen = parse_nodes(nodes, n, who)
     absent = [int(k) for k in chosen if int(k) not in at]
     if absent:
         raise InputError(f"{path}: no row for node {absent[0]}, which sensors= asks for - add it or choose other nodes")
-    return Sensors(chosen, d[[at[int(k)] for k in chosen]])
+    return Measured(Sensors(chosen, d[[at[int(k)] for k in chosen]]), sigma, notes)
+
+
+def _level(table: Table, noise: float, who: str) -> float:
+    """The noise of all data [m], 0 if unknown. Raises InputError."""
+    sigma = table.columns.get("sigma")
+    if sigma is None:
+        return noise
+    if noise:
+        raise InputError(f"{table.path}: noise={noise:g} and column sigma both state the noise - keep one")
+    if not sigma.min() > 0.0:
+        bad = int(sigma.argmin())
+        raise InputError(
+            f"{table.path}: line {table.lines[bad]}: sigma is {sigma[bad]:g} m - give a standard deviation > 0"
+        )
+    if np.ptp(sigma) > 1e-9 * sigma.max():
+        raise InputError(
+            f"{table.path}: sigma from {sigma.min():g} to {sigma.max():g} m - {who} weighs all data alike, state one"
+        )
+    return float(sigma[0])

@@ -29,7 +29,6 @@ ELEMENTS: dict[ElementName, tuple[str, str, tuple[int, int]]] = {
     "tri6": ("ElementTriP2", "ElementLineP1", (2, 4)),
 }
 BRICKS = ("hex8", "quad4", "quad8")  # their reference element is the unit cube or square, else a simplex
-NEWTON_TOLERANCE = 1e-12  # of a Newton step in reference coordinates
 CONGRUENCE_TOLERANCE = 1e-13  # relative difference of shape function gradients that is attributed to rounding
 # meshio's name and node order, for cells with det J > 0 and det J < 0 in scikit-fem's order
 MESHIO: dict[ElementName, tuple[str, list[int], list[int]]] = {
@@ -91,6 +90,13 @@ class Element:
         """Distance (...,) of xi (..., d) outside the reference element, in reference coordinates; negative inside."""
         below = -xi.min(axis=-1)
         return np.asarray(np.maximum(below, xi.max(axis=-1) - 1.0 if self.name in BRICKS else xi.sum(axis=-1) - 1.0))
+
+    def nearest(self, xi: Array) -> Array:
+        """Points (..., d) of the reference element near xi (..., d); xi itself inside."""
+        above = np.maximum(xi, 0.0)
+        if self.name in BRICKS:
+            return np.minimum(above, 1.0)
+        return np.asarray(above / np.maximum(above.sum(axis=-1, keepdims=True), 1.0))
 
     def on_side(self, side: int, s: Array) -> tuple[Array, Array]:
         """Points s (d - 1, n_q) of the reference facet on a side: xi (d, n_q), and outward normals (n_q, d)
@@ -206,34 +212,3 @@ class Geometry:
         """meshio's name of the cell type and the nodes (n_e, n_a) in its order, with positive orientation."""
         name, positive, negative = MESHIO[self.element.name]
         return name, np.where(self.orientation > 0, self.nodes[:, positive], self.nodes[:, negative])
-
-    def locate(self, x: Array) -> tuple[Array, Array, Array]:
-        """Cell (m,) and reference coordinates (m, d) of points x (m, d), and their distance outside the cell (m,)."""
-        X = self.X[self.nodes]
-        low, high = X.min(axis=1), X.max(axis=1)
-        margin = 0.1 * (high - low).max(axis=1, keepdims=True)  # sides may be curved
-        found = [
-            self._locate(x_i, X, np.flatnonzero(((low - margin <= x_i) & (x_i <= high + margin)).all(axis=1)))
-            for x_i in x
-        ]
-        cells, xi, outside = zip(*found, strict=True)
-        return np.array(cells), np.array(xi), np.array(outside)
-
-    def _locate(self, x: Array, X: Array, cells: Array) -> tuple[int, Array, float]:
-        """The same for one point among candidate cells, by Newton's method for x = sum_a N_a(xi) X_a."""
-        if not cells.size:  # outside the mesh: measure the distance to the nearest cell
-            cells = np.array([np.linalg.norm(self.centres - x, axis=1).argmin()])
-        X, xi = X[cells], np.full((len(cells), self.dim), 0.25)
-        for _ in range(20):
-            N, dN = self.element.shape_functions(xi.T)
-            r = np.einsum("ka,kai->ki", N, X) - x
-            cof, det = cofactors(np.einsum("kai,kaj->kij", X, dN), np)
-            before = xi
-            # clipped, as the map may fold far outside the cell
-            xi = np.clip(xi - np.einsum("kij,ki->kj", cof, r) / det[:, None], -4.0, 5.0)
-            if np.abs(xi - before).max() <= NEWTON_TOLERANCE:  # after two steps if all maps are affine
-                break
-        reached = np.abs(r).max(axis=1) <= 1e-9 * np.ptp(X, axis=1).max(axis=1)
-        outside = np.where(reached, self.element.outside(xi), np.inf)
-        best = int(outside.argmin())
-        return int(cells[best]), xi[best], float(outside[best])

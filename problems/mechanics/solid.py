@@ -14,6 +14,7 @@ from gradient_routes.problems.data import probes
 from gradient_routes.problems.data.displacement_data import DisplacementData
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Phi, Prior
+from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, held_components
 from gradient_routes.problems.fem.mesh import AXES, Mesh
@@ -98,13 +99,15 @@ class Solid(Problem):
         self.affine = self.linear and o.unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
         self.matrix_free = not use_numpy
-        self.noise, self.seed, self.synthetic = o.noise, o.seed, o.data == "twin"
+        self.noise, self.seed = standard_deviation(o.noise, measured, self.name), o.seed
+        self.synthetic = o.data == "twin"
         if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:
             self.notes += (f"nu={o.nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
         if amplitude == 0.0 and o.unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if measured:
-            self.data = self._from_file(o.data)
+            found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, self.noise)
+            self.data = self._from_file(found)
             self.start_from_data = o.modulus is None and o.unknown in MODULI and not gripped
         elif o.markers:
             in_plane = o.components == "in-plane"
@@ -116,13 +119,13 @@ class Solid(Problem):
         if self.data.reads_nothing():
             raise InputError(f"{self.name}: all sensors sit on clamped nodes and read zero - choose other points")
 
-    def _from_file(self, path: str) -> DisplacementData:
-        """Measurements read from a file."""
-        points, d = probes.read_probes(self.mesh, path)
-        greatest, size = float(np.abs(d).max()), self.mesh.diameter
+    def _from_file(self, measured: probes.Measured) -> DisplacementData:
+        greatest, size = float(np.abs(measured.d).max()), self.mesh.diameter
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        return DisplacementData(self.solid, points, d[None])
+        self.read_as = measured.notes
+        self.notes += self.read_as
+        return DisplacementData(self.solid, measured.probes, measured.d[None], measured.sigma)
 
     def _without_file(self, points: probes.Probes) -> DisplacementData:
         """The target displacements; none yet for synthetic data."""

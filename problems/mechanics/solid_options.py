@@ -6,7 +6,9 @@ import math
 from types import SimpleNamespace
 from typing import Annotated, Literal
 
+from gradient_routes.problems.data.placing import Outside
 from gradient_routes.problems.data.regularization import PHI_WIDTH
+from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.mechanics.design_variables import FIELDS, MATERIAL
 from gradient_routes.problems.mechanics.loaded_solid import Load
@@ -24,7 +26,10 @@ Nu = Annotated[float, "Poisson's ratio at small strain"]
 Modulus = Annotated[float | None, "Young's, to start from or known [1; fitted to a file's data]"]
 Derivatives = Annotated[Literal["ad", "hand"], "P, dP/dF, dP/dq by JAX or hand-derived in NumPy"]
 LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
-Noise = Annotated[float, "standard deviation added to a twin's data [m]"]
+Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every row [by its header]"]
+Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]
+OutsideOf = Annotated[Outside, "the file's points outside the body: an error, left out, or moved onto it"]
+Noise = Annotated[float | str | None, "standard deviation of a file's data, added to a twin's [m], or 0.4um"]
 Seed = Annotated[int, "of noise and markers"]
 Alpha = Annotated[float, "weight of Phi"]
 PhiWidth = Annotated[float, "jump of log E below which total variation is rounded"]
@@ -81,6 +86,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("mesh", meshed, False, {"element": element}),
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
+        ("data=FILE", measured, True, {"columns": o.columns, "units": o.units, "outside": o.outside != "refuse"}),
         ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
         ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers}),
         ("unknown=shape", o.unknown == "shape", True, {"surface": o.surface != "right"}),
@@ -99,8 +105,8 @@ def _check_numbers(who: str, o: SimpleNamespace) -> None:
         raise InputError(f"{who}: modulus={o.modulus:g} Pa - choose one from 1e-30 to 1e30")
     if not (math.isfinite(o.traction) and math.isfinite(o.displacement)):
         raise InputError(f"{who}: traction={o.traction:g}, displacement={o.displacement:g} - choose finite ones")
-    if not 0 <= o.noise < math.inf or (o.noise and o.data != "twin"):
-        raise InputError(f"{who}: noise={o.noise:g} - choose noise >= 0, for synthetic data (data=twin) only")
+    if standard_deviation(o.noise, o.data not in (None, "twin"), who) and o.data is None:
+        raise InputError(f"{who}: noise={o.noise} - it is that of measured or synthetic data: data=FILE or data=twin")
 
 
 def _check_unknown(who: str, o: SimpleNamespace) -> None:

@@ -19,6 +19,7 @@ from gradient_routes.problems.data.probes import read_probes
 from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.fem.assembly_jax import gradient
 from gradient_routes.problems.fem.elements import Element, Geometry
+from gradient_routes.problems.fem.locating import locate
 from gradient_routes.problems.fem.mesh import box_mesh, read_mesh
 from gradient_routes.problems.jax64 import jax
 from gradient_routes.problems.mechanics.materials import LAWS
@@ -320,7 +321,7 @@ def test_points_outside_a_mesh_are_refused_with_the_box_of_the_mesh(tmp_path: Pa
     moved = replace(mesh, geometry=replace(mesh.geometry, X=mesh.geometry.X + np.array([10.0, 20.0, 30.0])))
     path = tmp_path / "d.csv"
     path.write_text("x,y,z,ux,uy,uz\n11,22,42.012,0,0,1\n")
-    points, _ = read_probes(moved, str(path))
+    points = read_probes(moved, str(path)).probes
     np.testing.assert_allclose(points.read(moved.geometry.X[points.nodes]), [[11.0, 22.0, 42.012]], rtol=1e-12)
     path.write_text("x,y,z,ux,uy,uz\n11,22,42.012,0,0,1\n11,22,42.014,0,0,1\n")
     says = "data row 2 at (11, 22, 42.014) lies outside block, whose box of 3, 4, 12 m begins at (10, 20, 30) (1 of 2"
@@ -389,10 +390,10 @@ def test_points_in_distorted_and_in_flat_cells_are_found() -> None:
             X = geometry.X + 0.06 * inside[:, None] * rng.uniform(-1, 1, geometry.X.shape)
             geometry = Geometry(geometry.element, geometry.nodes, X)
         x = rng.uniform(0.0, size, (100, 3))
-        cells, xi, outside = geometry.locate(x)
-        N, _ = geometry.element.shape_functions(xi.T)
-        np.testing.assert_allclose(np.einsum("ma,mai->mi", N, geometry.X[geometry.nodes[cells]]), x, atol=1e-8)
-        assert outside.max() < 1e-9
+        found = locate(geometry, x)
+        N, _ = geometry.element.shape_functions(found.xi.T)
+        np.testing.assert_allclose(np.einsum("ma,mai->mi", N, geometry.X[geometry.nodes[found.cells]]), x, atol=1e-8)
+        assert found.distance.max() == 0.0
 
 
 def test_points_in_the_bulge_of_a_curved_side_are_found() -> None:
@@ -405,10 +406,10 @@ def test_points_in_the_bulge_of_a_curved_side_are_found() -> None:
     x = element.shape_functions(xi)[0] @ curved
     assert x[1] < curved[:, 1].min() - 0.01
     X = np.concatenate([curved, x - [0.0, 0.1, 0.0] + 0.02 * element.basis.doflocs])
-    cells, found, outside = Geometry(element, np.arange(20).reshape(2, 10), X).locate(x[None])
-    assert cells.tolist() == [0]
-    np.testing.assert_allclose(found, [xi], atol=1e-9)
-    assert outside[0] < 0.0
+    found = locate(Geometry(element, np.arange(20).reshape(2, 10), X), x[None])
+    assert found.cells.tolist() == [0]
+    np.testing.assert_allclose(found.xi, [xi], atol=1e-9)
+    assert found.distance[0] == 0.0
 
 
 def test_meshes_in_two_parts_and_of_two_kinds_are_refused(tmp_path: Path) -> None:

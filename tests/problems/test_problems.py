@@ -240,7 +240,8 @@ def test_sensor_sets(text, nodes: list[int]) -> None:
         ({"noise": -1.0}, "noise=-1"),
         ({"seed": -1}, "seed=-1"),
         ({"data": "nowhere.csv"}, "No such file"),
-        ({"data": "nowhere.csv", "noise": 0.1}, "synthetic"),
+        ({"data": "nowhere.csv", "noise": 0.0}, "> 0, or leave it out"),
+        ({"units": "mm"}, "units needs data=FILE"),
     ],
 )
 def test_bad_options_of_the_bar_are_one_line(options: dict, says: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +27,7 @@ from gradient_routes.bench.command_options import (
 from gradient_routes.bench.execution.options import executor_options, limit_options
 from gradient_routes.bench.ranges import MANY, SECONDS, SEED, SHORT
 from gradient_routes.bench.sanitize import echo
+from gradient_routes.bench.studies.data_options import UNITS, reading
 
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
@@ -46,7 +48,10 @@ DIRECTIONS = "Compute only the slopes of J along M random directions."
 VTU = f"Write u, lambda and dJ/dp on the mesh, for ParaView. For one problem and one route. {replaces('.vtu')}"
 SENSITIVITIES = f"Write du/dp, for one problem and --route tangent. {replaces('.csv', '.npz', '.vtu')}"
 OF = "Sensitivities of the state, du/dp, or of the data, d(S u)/dp."
-COLUMNS = "Parameters to write du/dp for, by number, as 1,5-8; also written to --vtu. [all; in --vtu none]"
+COLUMNS = (
+    "Columns of a data file, as x=NAME,ux=NAME; y=3mm is one value for all rows. [by its header] Or parameters to write"
+    " du/dp for, by number, as 1,5-8; also written to --vtu. [all; in --vtu none]"
+)
 BUDGET = "Skip gradients predicted to take longer [s] or to need more memory than there is; inf: skip none."
 TIMING = "Time the gradients; errors, counted work and memory are measured in any case."
 RESUME = "Run only cases that are missing in the store, failed, or stale: code, data or libraries changed."
@@ -71,6 +76,7 @@ YES = "Run more than 100 000 cases."
 @click.option("--sensitivities", type=click.Path(path_type=Path), metavar="FILE", help=SENSITIVITIES)
 @click.option("--sensitivities-of", type=click.Choice(["state", "data"]), default="state", show_default=True, help=OF)
 @click.option("--columns", metavar="LIST", help=COLUMNS)
+@click.option("--units", metavar="LIST", help=UNITS)
 @click.option("--resume", is_flag=True, help=RESUME)
 @click.option("--only", type=click.Choice(["missing", "failed", "stale", "all"]), help=ONLY)
 @click.option("--expected", type=click.Path(path_type=Path), metavar="FILE.toml", help=EXPECTED)
@@ -96,6 +102,7 @@ def run(
     sensitivities: Path | None,
     sensitivities_of: str,
     columns: str | None,
+    units: str | None,
     resume: bool,
     only: Only | None,
     expected: Path | None,
@@ -130,6 +137,8 @@ def run(
     from gradient_routes.bench.studies.bill.files import COLUMNS_OF, Files
     from gradient_routes.bench.studies.bill.sensitivity_files import wanted as columns_wanted
 
+    named = columns if columns and re.search("[:=]", columns) else None
+    problems, columns = (*reading(problems, columns=named, units=units),), None if named else columns
     partial = chosen(components, directions, seed)
     how = executing(isolate, limits, timed)
     told = described(problems, routes, limits) if isolate else case.NOTHING
@@ -142,7 +151,7 @@ def run(
     files.check(len(problem_specs), route_specs, partial, [*([kept] if kept else []), *read])
     if sensitivities is None:
         refuse_given(("sensitivities_of",), "is of --sensitivities")
-        if vtu is None or route_specs[0].name != COLUMNS_OF:
+        if columns is not None and (vtu is None or route_specs[0].name != COLUMNS_OF):
             refuse_given(("columns",), f"is of --sensitivities, and of --vtu with --route {COLUMNS_OF}")
     for left_out in case.left_out(problems, routes):
         complain(f"left out of 'all': {left_out}")

@@ -10,6 +10,7 @@ from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Options, Rule, Study
 from gradient_routes.bench.command_options import at_option, replaces, solver_options
 from gradient_routes.bench.ranges import FROM_ZERO, MANY, SEED
+from gradient_routes.bench.studies.data_options import data_options
 from gradient_routes.bench.verification.columns import CHECKS, POINTS
 
 ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
@@ -47,6 +48,7 @@ STUDY = Study(
         click.option("--objective", metavar="FILE.py:NAME", help="A function J(p), in place of an object."),
         click.option("--gradient", metavar="FILE.py:NAME", help="A function dJ/dp(p) -> (n_p,), beside --objective."),
         click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract."),
+        data_options,
         click.option("--route", metavar="SELECTOR", help="A route, or FILE.py:NAME; without --problem its contract."),
         click.option("--adapter", metavar="FILE", help="Another code on --problem: its adapter's script or command."),
         at_option,

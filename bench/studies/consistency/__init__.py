@@ -9,6 +9,7 @@ from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
 from gradient_routes.bench.ranges import COUNT, FROM_ZERO
 from gradient_routes.bench.studies.consistency.columns import CONSISTENCY, STEPS
+from gradient_routes.bench.studies.data_options import data_options
 from gradient_routes.bench.studies.options import PROBLEM
 
 DEFAULT = "advection[n=8,data=twin,noise=0.01,alpha=0.0001]"
@@ -30,6 +31,7 @@ STUDY = Study(
     Exit code: 0 measured, 1 J cannot be evaluated or minimized, 2 wrong usage, 130 interrupted, nothing kept.""",
     options=(
         click.option("--problem", "selector", default=DEFAULT, show_default=True, metavar="SELECTOR", help=PROBLEM),
+        data_options,
         routes_option("adjoint and all inconsistent ones", given=()),
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help="How."),

@@ -109,6 +109,7 @@ class Run:
     def each(self, resumed: Path | None, minibatch: int | None, seed: int) -> None:
         """Route by route, from where each ended in the store `resumed` if given; then the cost of each."""
         problem = self.spec()
+        self._tell(problem)
         starts: list[Start] = [(None, 0)] * len(self.routes)
         if resumed is not None:  # what is not there is refused before anything runs
             starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
@@ -167,6 +168,7 @@ class Run:
             return
         points = l_curve(self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at))))
         best = next((point for point in points if point.chosen), points[-1]).inversion
+        self._tell(best.made)
         self._warn(best)
         self._judge([point.inversion for point in points])
         self._keep("lcurve", [point.row for point in points])
@@ -204,6 +206,10 @@ class Run:
         self.misled = bool(ends)
         for end in ends[:1]:
             self.say(Note(f"invert: {end}"))
+
+    def _tell(self, problem: Problem) -> None:
+        for text in problem.read_as:
+            self.say(Note(f"{problem.name}: {text}"))
 
     def _warn(self, found: Inversion) -> None:
         if found.warning is not None:

@@ -8,6 +8,7 @@ from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Study
 from gradient_routes.bench.command_options import at_option, routes_option, solver_options
 from gradient_routes.bench.ranges import MANY, SECONDS, SHORT, Real, Whole
+from gradient_routes.bench.studies.data_options import data_options
 from gradient_routes.bench.studies.scaling.columns import BREAK_EVEN, SCALING_FITS
 
 PROBLEM = "NAME, whose n grows, or a grid of sizes: 'NAME[n=8|64|512]'."
@@ -28,6 +29,7 @@ STUDY = Study(
     Exit code: 0 measured, 1 no route could be measured, 2 wrong usage, 130 interrupted.""",
     options=(
         click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM),
+        data_options,
         routes_option("all"),
         at_option,
         click.option("--from", "first", type=MANY, metavar="N", help=FROM),
