@@ -178,6 +178,6 @@ def make_mesh(who: str, element: ElementName, mesh: Any) -> Mesh:
         from skfem import MeshTet2, MeshTri2
 
         kind = MeshTet2 if element == "tet10" else MeshTri2
-        quadratic = mesh if isinstance(mesh, kind) else kind.from_mesh(mesh)
+        quadratic = mesh if isinstance(mesh, kind) else kind.from_mesh(mesh).with_boundaries(mesh.boundaries or {})
         return Mesh(who, quadratic, Geometry(Element(element), quadratic.dofs.element_dofs.T, quadratic.doflocs.T))
     return Mesh(who, mesh, Geometry(Element(element), np.ascontiguousarray(mesh.t.T), np.ascontiguousarray(mesh.p.T)))

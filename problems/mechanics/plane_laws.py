@@ -12,7 +12,6 @@ theorem: dh = -dP_33/A_3333 at fixed h, thus A = A_2D - a a^T/A_3333 with a = dP
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
