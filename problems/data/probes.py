@@ -99,10 +99,8 @@ def read_probes(
     Raises InputError for a file that cannot be understood, and for points outside the body.
     """
     axes = AXES[: mesh.geometry.dim]
-    ux = Group(tuple(f"u{axis}" for axis in axes), "length", need="any", gaps=True)
-    deviations = Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True)
-    table = read_table(path, (Group(tuple(axes), "length", marked=False), ux, deviations), columns, units)
-    x, d = table.stack(axes), table.stack(ux.names)
+    table = read_table(path, groups(axes), columns, units)
+    x, d = table.stack(axes), table.stack([f"u{axis}" for axis in axes])
     if np.isnan(d).all():
         raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
     sigma = noise_of(table, axes, d, noise)
@@ -118,6 +116,15 @@ def read_probes(
     probes = Probes(placed.nodes, placed.N, placed.x, measured, weights)
     notes = tuple(filter(None, (table.said, repeated, *placed.said)))
     return Measured(probes, np.where(measured, d, 0.0), sigma, notes)
+
+
+def groups(axes: str) -> tuple[Group, Group, Group]:
+    """The columns of coordinates, displacements and their noise."""
+    return (
+        Group(tuple(axes), "length", marked=False),
+        Group(tuple(f"u{axis}" for axis in axes), "length", need="any", gaps=True),
+        Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True),
+    )
 
 
 def noise_of(table: Table, axes: str, d: Array, noise: float) -> Array | float:

@@ -13,7 +13,7 @@ from commands import Ran
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.data import csv
-from gradient_routes.problems.data.probes import COORDINATES, DISPLACEMENTS, NOISE, Measured, read_probes
+from gradient_routes.problems.data.probes import Measured, groups, read_probes
 from gradient_routes.problems.data.table import Table, read_table
 from gradient_routes.problems.data.units import UNITS, factor, quantity
 from gradient_routes.problems.errors import InputError
@@ -41,11 +41,11 @@ def box() -> Mesh:
 
 
 def read(path: str, columns: str | None = None, units: str | None = None) -> Table:
-    return read_table(path, (COORDINATES, DISPLACEMENTS, NOISE), columns, units)
+    return read_table(path, groups("xyz"), columns, units)
 
 
 def values(table: Table) -> np.ndarray:
-    return table.stack((*COORDINATES.names, *DISPLACEMENTS.names))
+    return table.stack(("x", "y", "z", "ux", "uy", "uz"))
 
 
 FORMS: dict[str, tuple[str | bytes, str | None, str | None, str]] = {
