@@ -13,7 +13,7 @@
 #            length 0 0
 #            root nan nan
 #            sqrt inf
-# Used in:   docs/explanation/slopes-at-ties.md
+# Used in:   docs/explanation/conventions.md
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
