@@ -17,9 +17,9 @@ from gradient_routes.routes.foreign.manifest import manifest, shipped
 
 PAGE = ROOT / "docs" / "explanation" / "conventions.md"
 SCRIPTS = ROOT / "examples" / "conventions"
-ADAPTER = {name: name.lower() for name in ("Warp", "Taichi", "DOLFINx", "Lineax", "torch-fem")} | {"PyTorch": "torch"}
+ADAPTER = {name: name.lower() for name in ("Warp", "Taichi", "DOLFINx", "Lineax")} | {"PyTorch": "torch"}
 OURS = {"JAX": jax.__version__, "SciPy": scipy.__version__}
-RELEASE = re.compile(r"([\w-]+) (\d[\d.]*)")
+RELEASE = re.compile(r"\w+ \d[\d.]*")
 
 
 def tabulated() -> dict[str, dict[str, str]]:
