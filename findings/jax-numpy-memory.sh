@@ -4,6 +4,7 @@
 #            by an optimizer that works in place, the gradient is wrong, without an error. jax.device_put(x) shares the
 #            memory of x where that begins at a multiple of 64 bytes, and copies it elsewhere: JAX's own array, said to
 #            be immutable, changes with x, or does not, by where NumPy happens to have put x. jnp.asarray copies.
+#            (jax-ml/jax#37830 has device_put.)
 # Output:    of sum(x * x) at 1.1, x = 5 after the forward sweep: exact 2.2
 #            at a multiple of 64 bytes: x 10, jax.device_put(x) 10, jnp.asarray(x) 2.2
 #            8 bytes beyond it: x 10, jax.device_put(x) 2.2, jnp.asarray(x) 2.2

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Software:  taichi 1.7.4 on a CPU, Python 3.11
 # Behaviour: ti.sym_eig gives an eigenvector of NaN for every diagonal 2 x 2 matrix with different entries, as the strain
-#            of a uniaxial test is. For a 3 x 3 matrix of plane strain, A_13 = A_23 = 0, it gives eigenvectors that are
-#            finite, not orthogonal and not eigenvectors, without an error. Eigenvalues are right, and so are the
+#            of a uniaxial test is. For many 3 x 3 matrices of plane strain, A_13 = A_23 = 0, it gives vectors that are
+#            finite, not orthogonal and no eigenvectors, without an error. Eigenvalues are right, and so are the
 #            eigenvectors of full matrices. The slope of the sum of the squared eigenvalues of a 2 x 2 matrix, which is
-#            2 A, is NaN at the identity.
+#            2 A, is NaN at the identity. (taichi-dev/taichi#5434, #8468)
 # Output:    diag(1, 2): w 2 1, |A v - w v| nan 0
 #            diag(2, 1): w 2 1, |A v - w v| 0 nan
 #            full 2 x 2: w 3 1, |A v - w v| 0 0
