@@ -117,6 +117,7 @@ class Bar(Problem):
             d = (self._tip_load(S[-1])[0] * S)[nodes - 1]
             self.sensors = Sensors(nodes, d + sigma * np.random.default_rng(seed).standard_normal(len(nodes)))
         E = 1.0 if modulus is None else modulus
+        self.measured = data is not None
         self.start_from_data = data is not None and modulus is None
         self.parameters = Parameters(
             start=np.full(n, math.log(E) if self.log else E),

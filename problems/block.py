@@ -65,6 +65,7 @@ class Block(Solid):
         columns: options.Columns = None,
         units: options.Units = None,
         outside: options.OutsideOf = "refuse",
+        motion: options.MotionOf = "none",
         noise: options.Noise = None,
         seed: options.Seed = 0,
         alpha: options.Alpha = 0.0,

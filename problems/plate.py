@@ -81,6 +81,7 @@ class Plate(Solid):
         columns: options.Columns = None,
         units: options.Units = None,
         outside: options.OutsideOf = "refuse",
+        motion: options.MotionOf = "none",
         noise: options.Noise = None,
         seed: options.Seed = 0,
         alpha: options.Alpha = 0.0,

@@ -229,6 +229,7 @@ class Problem:
     typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
                no one in particular
     start_from_data  whether the start of p says nothing of the body that was measured: its size comes from the data
+    measured   whether the data come from a file
     notes      sentences a user should read beside the result
     read_as    those of them that say how a data file was read
     """
@@ -248,6 +249,7 @@ class Problem:
     stop: Stop | None = None
     typical: int | None = None
     start_from_data: bool = False
+    measured: bool = False
     notes: tuple[str, ...] = ()
     read_as: tuple[str, ...] = ()
 
@@ -316,6 +318,10 @@ class Problem:
     def stiffened(self, factor: float) -> Problem:
         """This problem, its data and its mesh, from a start that is `factor` times as stiff."""
         raise NotOffered(f"{self.name}: its start has no stiffness to multiply")
+
+    def stated(self, p: Array) -> Mapping[str, Any]:
+        """What p means in constants that people state, such as E and nu, by name with the unit; holomorphic."""
+        return {}
 
     def candidates(self) -> Candidates | None:
         """What sensors can read; None: any unknown of the state."""
@@ -426,8 +432,11 @@ class Fields:
 
 @dataclass(frozen=True)
 class ParameterView:
-    """Columns (n_p,) to show beside a gradient, and a `mark` for parameters that no datum depends on, the `blind`."""
+    """Columns (n_p,) to show beside a gradient, and a `mark` for parameters that no datum depends on, the `blind`;
+    values of unknowns that are `eliminated` from J, by name.
+    """
 
     columns: Mapping[str, Array] = field(default_factory=dict)
     blind: Array | None = None
     mark: str = "blind"
+    eliminated: Mapping[str, float] = field(default_factory=dict)

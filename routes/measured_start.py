@@ -30,7 +30,8 @@ def with_measured_start(problem: Problem, solver: Solver | None = None) -> Probl
         other.notes += ("the data do not point where the load does: they tell no size to start from, give modulus=",)
         return other
     other = problem.stiffened(c)
-    other.notes += (f"start: a modulus of {c:.4g} Pa everywhere, fitted to the data",)
+    said = f"start: a modulus of {c:.4g} Pa everywhere, fitted to the data"
+    other.notes, other.read_as = (*other.notes, said), (*other.read_as, said)
     return other
 
 

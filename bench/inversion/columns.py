@@ -35,6 +35,7 @@ ESTIMATES = (
     *PLACE,
     Column("start", "REAL", "its own", "p_0"),
     Column("estimate", "REAL", "its own", "p at the end"),
+    Column("sd", "REAL", "its own", "its standard deviation by the noise of measured data"),
     Column("truth", "REAL", "its own", "p behind synthetic data"),
     Column("gradient", "REAL", "problem's", "dJ/dp at the end"),
     Column("blind", "INTEGER", "1", "1 where no datum depends on it"),

@@ -18,6 +18,7 @@ from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
+from gradient_routes.bench.inversion.fit import Fit, fit
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective, observed
 from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, converged, flat, optimizer
@@ -66,6 +67,7 @@ class Inversion:
     end      why it stopped; stop: why the optimizer itself did; interrupted: by Ctrl-C
     ending_solves  forward solves after the last step, to explain or to confirm the end
     scaled   the units of the optimizer's variables; warning: what is wrong with them
+    fit      residuals and error bars, where data were measured
     """
 
     problem: str
@@ -91,11 +93,17 @@ class Inversion:
     interrupted: bool = field(repr=False)
     warning: str | None = field(repr=False)
     scaled: str = field(repr=False)
+    fit: Fit | None = field(default=None, repr=False)
 
     @property
     def misled(self) -> bool:
         """Whether the gradient has turned out not to be that of J."""
         return self.end.startswith(MISLED)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the model does not explain the data: residuals exceed their noise."""
+        return self.fit is not None and self.fit.residuals.exceed
 
     @property
     def forward_solves(self) -> int:
@@ -123,6 +131,7 @@ class Inversion:
             **dict(zip("xyz", x, strict=True)),
             "start": self.start[i],
             "estimate": self.p[i],
+            "sd": None if self.fit is None or np.isnan(self.fit.sd[i]) else self.fit.sd[i],
             "truth": None if self.truth is None else self.truth[i],
             "gradient": self.gradient[i],
             "blind": None if self.view.blind is None else int(self.view.blind[i]),
@@ -217,6 +226,7 @@ def invert(
         interrupted,
         variables.warning(None if seen is None else seen.data),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
+        None if interrupted else fit(problem, last.p, engine.solver),
     )
 
 

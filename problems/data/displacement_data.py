@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.data.motion import Motion
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.probes import Probes
 from gradient_routes.problems.errors import InputError
@@ -22,12 +23,14 @@ class DisplacementData:
 
     d (cases, m, d)  [m], None for synthetic data that are not computed yet
     noise            standard deviation of the noise on d [m]
+    motion           what is eliminated from J, in every load case for itself
     """
 
     solid: LoadedSolid
     probes: Probes
     d: Array | None
     noise: float = 0.0
+    motion: Motion | None = None
 
     def require_data(self) -> Array:
         """d. Raises InputError for synthetic data that are not computed yet."""
@@ -58,12 +61,26 @@ class DisplacementData:
 
     def misfit(self, u: Any, p: Any, xp: Any = np) -> Any:
         d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p, xp), xp)
-        return sum(self.probes.misfit(U[case], d[case]) for case in range(len(d)))
+        return sum(0.5 * (self._residual(U[case], d[case]) ** 2).sum() for case in range(len(d)))
+
+    def _residual(self, U: Any, d: Any) -> Any:
+        """P w (S u - d), (m,), of one load case."""
+        r = self.probes.residual(U, d)
+        return r if self.motion is None else self.motion.projected(r)
+
+    def moved(self, u: Array, p: Array) -> dict[str, float]:
+        """The motion that is eliminated, by name."""
+        if self.motion is None:
+            return {}
+        d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
+        found = [self.motion.of_residual(self.probes.residual(U[case], d[case])) for case in range(len(d))]
+        several = len(found) > 1
+        return {f"{name}, case {k + 1}" if several else name: m for k, of in enumerate(found) for name, m in of.items()}
 
     def misfit_gradient(self, u: Array, p: Array) -> tuple[Array, Any]:
         """Derivatives of the misfit with respect to u (n_u,) and the grip displacement."""
         d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
-        forces = [self.probes.misfit_gradient(U[case], d[case]) for case in range(len(d))]
+        forces = [self.probes.forces(self._residual(U[case], d[case])) for case in range(len(d))]
         parts = [self.solid.bc.assemble(f, self.probes.nodes, case) for case, f in enumerate(forces)]
         return np.concatenate([by_u for by_u, _ in parts]), sum(by_a for _, by_a in parts)
 
@@ -75,9 +92,9 @@ class DisplacementData:
         data = np.concatenate([d[case][measured] for case in cases])
         S_p = S_a if self.solid.grip_is_parameter else None
         seen = Observation(predicted, data, S_u, S_p, self.noise, self._label)
-        if self.probes.weights is None:
-            return seen
-        return seen.weighted(np.tile(self.probes.weights[measured], len(d)))
+        if self.probes.weights is not None:
+            seen = seen.weighted(np.tile(self.probes.weights[measured], len(d)))
+        return seen if self.motion is None else seen.without(self.motion, len(d))
 
     def candidates(self) -> Candidates:
         """Every free displacement component of every node, in every load case."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.data.motion import Motion
 from gradient_routes.problems.problem import Array
 
 
@@ -22,6 +23,8 @@ class Observation:
     sigma              standard deviation of the noise on data, 0 if unknown
     label              (k) -> name of datum k
     weight             factor contained in predicted, data, S_u and sigma
+    relative           weights of the data, relative to their mean accuracy, contained in them as well
+    sampling (m, n_u)  S, sparse, where S_u is what is left of it; eliminated: how many unknowns took the rest
     """
 
     predicted: Array
@@ -32,6 +35,8 @@ class Observation:
     label: Callable[[int], str] = str
     weight: float = 1.0
     relative: Array | float = 1.0
+    sampling: Any = None
+    eliminated: int = 0
 
     def weighted(self, w: Array) -> Observation:
         """With factors w (m,), by which J weights the data; those of equal accuracy have one sigma then."""
@@ -45,6 +50,32 @@ class Observation:
             S_u=rows @ self.S_u,
             S_p=None if self.S_p is None else rows @ self.S_p,
             relative=w * self.relative,
+        )
+
+    def without(self, motion: Motion, cases: int) -> Observation:
+        """With the motion of each load case eliminated; S_u is a LinearOperator then."""
+        from scipy.sparse.linalg import LinearOperator
+
+        S, m = self.S_u.tocsr(), len(motion.Q)
+        parts = [motion.sampled(S[k * m : (k + 1) * m]) for k in range(cases)]
+
+        def stacked(v: Array) -> Array:
+            return np.concatenate([part @ v for part in parts])
+
+        def spread(w: Array) -> Array:
+            return np.asarray(sum(part.T @ w[k * m : (k + 1) * m] for k, part in enumerate(parts)))
+
+        def projected(v: Array) -> Array:
+            return np.asarray(motion.projected(v.reshape(cases, m))).ravel()
+
+        return replace(
+            self,
+            predicted=projected(self.predicted),
+            data=projected(self.data),
+            S_u=LinearOperator(S.shape, matvec=stacked, rmatvec=spread, matmat=stacked, rmatmat=spread, dtype=float),
+            S_p=None if self.S_p is None else np.stack([projected(column) for column in self.S_p.T], axis=1),
+            sampling=self.S_u,
+            eliminated=cases * motion.Q.shape[1],
         )
 
 

@@ -36,17 +36,18 @@ class Probes:
         """(m, d) [m], from the nodes' displacements U (m, k, d)."""
         return (self.N[..., None] * U).sum(1)
 
-    def misfit(self, U: Any, d: Any) -> Any:
-        """1/2 |w (S u - d)|^2 over what is measured, holomorphic."""
+    def residual(self, U: Any, d: Any) -> Any:
+        """w (S u - d) of what is measured, (m_measured,), holomorphic."""
         r = self.read(U) - d
-        return 0.5 * ((r if self.weights is None else self.weights * r)[self.measured] ** 2).sum()
+        return (r if self.weights is None else self.weights * r)[self.measured]
 
-    def misfit_gradient(self, U: Array, d: Array) -> Array:
-        """Derivative of the misfit with respect to U, (m, k, d)."""
-        r = np.where(self.measured, self.read(U) - d, 0.0)
+    def forces(self, r: Array) -> Array:
+        """Derivative of 1/2 |w (S u - d)|^2 with respect to U, (m, k, d), for its residual r."""
+        by_x = np.zeros(self.measured.shape)
+        by_x[self.measured] = r
         if self.weights is not None:
-            r = self.weights**2 * r
-        return np.asarray(self.N[..., None] * r[:, None])
+            by_x = self.weights * by_x
+        return np.asarray(self.N[..., None] * by_x[:, None])
 
 
 def at_nodes(mesh: Mesh, nodes: Array) -> Probes:

@@ -12,6 +12,7 @@ import numpy as np
 
 from gradient_routes.problems.data import probes
 from gradient_routes.problems.data.displacement_data import DisplacementData
+from gradient_routes.problems.data.motion import Motion, MotionName
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Phi, Prior
 from gradient_routes.problems.data.units import standard_deviation
@@ -76,6 +77,7 @@ class Solid(Problem):
             raise InputError(f"{self.name}: loaded={o.loaded}: all its nodes are clamped - choose another face")
         gripped = o.load == "displacement"
         E, measured = o.modulus or 1.0, o.data not in (None, "twin")
+        self.measured = measured
         self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
         amplitude, unit = (o.displacement, "m") if gripped else (o.traction, "Pa")
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
@@ -116,6 +118,7 @@ class Solid(Problem):
             where = o.sensors or ("right" if gripped else o.loaded)
             nodes = np.unique(mesh.geometry.nodes) if where == "everywhere" else mesh.boundary(where).node_set
             self.data = self._without_file(probes.at_nodes(mesh, nodes))
+        self.data = self._with_motion(self.data, o.motion)
         if self.data.reads_nothing():
             raise InputError(f"{self.name}: all sensors sit on clamped nodes and read zero - choose other points")
 
@@ -132,6 +135,15 @@ class Solid(Problem):
         height = TARGET * (points.x[:, -1] - self.mesh.bounding_box[0, -1])
         target = height[None, :, None] * self.solid.directions[:, None]
         return DisplacementData(self.solid, points, None if self.synthetic else target, self.noise)
+
+    def _with_motion(self, data: DisplacementData, kind: MotionName) -> DisplacementData:
+        """With a motion to eliminate. Raises InputError for data that are all motion."""
+        at = data.probes
+        motion = Motion.of(kind, at.x, at.measured, at.weights, self.mesh.geometry.axisymmetric)
+        if motion is not None and data.d is not None:
+            still = np.zeros((*at.nodes.shape, at.x.shape[1]))
+            motion.check(np.stack([at.residual(still, d) for d in data.d]), self.name)
+        return replace(data, motion=motion)
 
     def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: AnyDesign) -> Prior:
         """Neighbours are cells that share a facet, and adjacent layers."""
@@ -226,6 +238,13 @@ class Solid(Problem):
     def _is_log(self) -> bool:
         return self.log and self.solid.design.field is not None
 
+    def stated(self, p: Array) -> dict[str, Any]:
+        """Young's modulus and Poisson's ratio, where p are Lame's constants."""
+        if self._options["unknown"] != "constants" or self.solid.law.constants != ("mu", "lam"):
+            return {}
+        mu, lam = p
+        return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)}
+
     # --- synthetic data
 
     def truth(self) -> Array | None:
@@ -275,8 +294,9 @@ class Solid(Problem):
         return Fields(in_space(s.X), *geometry.for_meshio(), {k: in_space(v) for k, v in point_data.items()}, cell_data)
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
-        x = self.parameters.position
-        return ParameterView() if x is None else ParameterView(dict(zip(AXES[: x.shape[1]], x.T, strict=True)))
+        x, moved = self.parameters.position, self.data.moved(u, p)
+        columns = {} if x is None else dict(zip(AXES[: x.shape[1]], x.T, strict=True))
+        return ParameterView(columns, eliminated=moved)
 
 
 def in_space(x: Array) -> Array:

@@ -6,6 +6,7 @@ import math
 from types import SimpleNamespace
 from typing import Annotated, Literal
 
+from gradient_routes.problems.data.motion import MotionName
 from gradient_routes.problems.data.placing import Outside
 from gradient_routes.problems.data.regularization import PHI_WIDTH
 from gradient_routes.problems.data.units import standard_deviation
@@ -29,6 +30,7 @@ LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
 Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every row [by its header]"]
 Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]
 OutsideOf = Annotated[Outside, "the file's points outside the body: an error, left out, or moved onto it"]
+MotionOf = Annotated[MotionName, "of the camera or the grips, unknown, in the data: eliminated from J"]
 Noise = Annotated[float | str | None, "standard deviation of a file's data, added to a twin's [m], or 0.4um"]
 Seed = Annotated[int, "of noise and markers"]
 Alpha = Annotated[float, "weight of Phi"]
@@ -87,6 +89,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, True, {"columns": o.columns, "units": o.units, "outside": o.outside != "refuse"}),
+        ("data", o.data is not None, True, {"motion": o.motion != "none"}),
         ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
         ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers}),
         ("unknown=shape", o.unknown == "shape", True, {"surface": o.surface != "right"}),

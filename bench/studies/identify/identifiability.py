@@ -18,7 +18,7 @@ from gradient_routes.bench.cases.machine import available_bytes
 from gradient_routes.bench.cases.options import convert, options_of
 from gradient_routes.bench.cases.registry import factory_of
 from gradient_routes.bench.cases.suggest import did_you_mean
-from gradient_routes.bench.studies.identify import posterior
+from gradient_routes.bench.inversion import posterior
 from gradient_routes.bench.units import size
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import OFFERED_AS, Array, Offers, Problem

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gradient_routes.bench.studies.identify import posterior
+from gradient_routes.bench.inversion import posterior
 from gradient_routes.bench.studies.identify.identifiability import Identified
 from gradient_routes.bench.units import size
 from gradient_routes.problems.data.observation import Candidates
@@ -116,7 +116,9 @@ def _candidates(problem: Problem, H: Sensitivity, afresh: bool, seed: int) -> tu
     offered = problem.candidates() or Candidates(np.arange(problem.n_state), lambda j: f"u_{j + 1}")
     kept, notes = np.arange(len(offered.at)), []
     if not afresh:
-        kept = np.flatnonzero(~np.isin(offered.at, _measured(H.seen.S_u)))
+        kept = np.flatnonzero(
+            ~np.isin(offered.at, _measured(H.seen.S_u if H.seen.sampling is None else H.seen.sampling))
+        )
     room = max(1, LARGEST // (8 * H.shape[1]))
     if len(kept) > room:
         needed = size(8.0 * len(kept) * H.shape[1])

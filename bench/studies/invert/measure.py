@@ -99,7 +99,9 @@ def run(
 
 
 class Run:
-    """One call; `failure` is what ended it early, `misled` whether a gradient was not that of J."""
+    """One call; `failure` is what ended it early, `misled` whether a gradient was not that of J, or the model does not
+    explain the data.
+    """
 
     def __init__(self, say: Say, spec: ProblemSpec, routes: Sequence[RouteSpec], engine: Engine, at: str) -> None:
         self.say, self.spec, self.routes, self.engine, self.at = say, spec, routes, engine, at
@@ -130,7 +132,7 @@ class Run:
             self.say(Found(Begun(title, problem.truth() is not None)))
             found = invert(self.spec, route, self.engine, self.at, p, self._show, problem, run, offset)
             yield found
-            self.misled = self.misled or found.misled
+            self.misled = self.misled or found.misled or found.unexplained
             self.say(Found(Ended(found, one_shot)))
             self._warn(found)
             if found.interrupted:

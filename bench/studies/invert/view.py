@@ -73,6 +73,13 @@ def show(out: Console, found: object, plots: bool = True) -> None:
 def _estimates(out: Console, found: Inversion) -> None:
     out.print()
     tables.show(out, estimates(found))
+    if found.fit is not None:
+        stated = ", ".join(f"{name} {value:.4g} +- {sd:.2g}" for name, (value, sd) in found.fit.stated.items())
+        says = Text("\n".join(filter(None, (stated, found.fit.residuals.described))))
+        out.print(says, style="yellow" if found.unexplained else "", soft_wrap=not out.is_terminal)
+    if found.view.eliminated:
+        moved = ", ".join(f"{name} {value:.4g}" for name, value in found.view.eliminated.items())
+        out.print(Text(f"eliminated from J: {moved}"), soft_wrap=not out.is_terminal)
     picture = cells(found)
     if picture:
         out.print(picture)
@@ -146,7 +153,9 @@ def estimates(found: Inversion) -> Table:
         " ".join(name.split()[:-2]) + "\n" + " ".join(name.split()[-2:]) if len(name) > WIDE else name
         for name in beside
     ]
-    table = tables.columns(("p", None), "start", "estimate", *truth, "dJ/dp", *two_lines, ("", None))
+    sd = [] if found.fit is None or np.isnan(found.fit.sd).all() else [found.fit.sd]
+    bars = ["+-"] * len(sd)
+    table = tables.columns(("p", None), "start", "estimate", *bars, *truth, "dJ/dp", *two_lines, ("", None))
     units = list(dict.fromkeys(map(q.unit_of, range(found.n_param))))
     table.title_justify, one = "left", units[0] if len(units) == 1 else None
     table.title = Text(f"{found.label}, p in {one}" if one else found.label, style="bold")
@@ -156,7 +165,13 @@ def estimates(found: Inversion) -> Table:
             table.add_row(tables.left_out(n), style="dim")
             continue
         hidden = found.view.blind is not None and bool(found.view.blind[i])
-        values = [found.start[i], found.p[i], *([] if found.truth is None else [found.truth[i]]), found.gradient[i]]
+        values = [
+            found.start[i],
+            found.p[i],
+            *(bar[i] for bar in sd),
+            *([] if found.truth is None else [found.truth[i]]),
+            found.gradient[i],
+        ]
         values += [column[i] for column in beside.values()]
         bar = "blind" if hidden else "#" * round(BARS * abs(float(found.p[i])) / largest)
         label = q.label(i) if one else f"{q.label(i)} [{q.unit_of(i)}]"

@@ -11,8 +11,9 @@ from conftest import relative_error, somewhere, zoo
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.registry import study_tables
+from gradient_routes.bench.inversion import posterior
 from gradient_routes.bench.store.store import Store
-from gradient_routes.bench.studies.identify import identifiability, posterior
+from gradient_routes.bench.studies.identify import identifiability
 from gradient_routes.bench.studies.identify.identifiability import Identified, identify, varied
 from gradient_routes.bench.studies.identify.placement import greedy, place
 from gradient_routes.problems.bar import Bar
