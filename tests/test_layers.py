@@ -19,7 +19,7 @@ CONTRACT = {"problem", "errors", "text", "matrices.tridiagonal", "matrices.spars
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (
     *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "environments", "render"),
-    *("verification", "inversion", "regression", "studies", "commands", "api", "cli", "start"),
+    *("verification", "protocols", "inversion", "regression", "studies", "commands", "api", "cli", "start"),
 )
 # the only modules that import JAX when they are imported; nothing imports those before it needs them
 TRACED = {

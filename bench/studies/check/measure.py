@@ -9,6 +9,9 @@ from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.imported import imported
 from gradient_routes.bench.cases.study import Found, Say
+from gradient_routes.bench.protocols import forward
+from gradient_routes.bench.protocols.target import forward as foreign_model
+from gradient_routes.bench.protocols.target import is_foreign
 from gradient_routes.bench.studies.check.conclude import conclude, page_writable
 from gradient_routes.bench.studies.options import one_route, problem_at
 from gradient_routes.bench.verification import adapter as by_adapter
@@ -20,6 +23,7 @@ from gradient_routes.bench.verification.registered import subject
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array
 from gradient_routes.routes.foreign.command import command_of
 from gradient_routes.routes.newton import Solver
 
@@ -33,6 +37,8 @@ def run(
     problem: str | None,
     route: str | None,
     adapter: str | None,
+    config: str | None,
+    data: str | None,
     at: str,
     budget: int,
     accept: float,
@@ -59,9 +65,13 @@ def run(
     if problem is not None and adapter is not None:
         made, p = problem_at(problem, at)
         asked = by_adapter.subject(made, command_of(adapter), adapter, p, solver)
+    elif target is not None and is_foreign(target):
+        asked = forward.subject(
+            foreign_model(target, config), _start(at), None if data is None else _column(data), seed
+        )
     else:
         asked = _subject(target, objective, gradient, problem, route, at, solver)
-    page_writable(html, kept, [target, objective, gradient, problem, route, at])
+    page_writable(html, kept, [target, objective, gradient, problem, route, config, data, at])
     with stdout_to_stderr():
         found = check(asked, plan, accept)
     named = {"problem": problem or target or f"{objective} {gradient}", "route": route or adapter, "at": at}
@@ -94,9 +104,7 @@ def _subject(
         spec = one_route(route)
         made, p = problem_at(problem, at)
         return subject(made, spec.route, spec.options, p, solver)
-    if at == "true":
-        raise InputError("check: --at true is for registered problems with synthetic data - give a file")
-    start = None if at == "start" else _column(at)
+    start = _start(at)
     if target is not None:
         return foreign.subject_of(imported(target), target, start)
     if objective is None or gradient is None:
@@ -106,8 +114,15 @@ def _subject(
     return foreign.subject(imported(objective), imported(gradient), start, name=gradient)
 
 
-def _column(at: str) -> object:
-    columns = read_columns(at, None, folder=located(""))
+def _start(at: str) -> Array | None:
+    """The point of a file; None for that of the code itself."""
+    if at == "true":
+        raise InputError("check: --at true is for registered problems with synthetic data - give a file")
+    return None if at == "start" else _column(at)
+
+
+def _column(file: str) -> Array:
+    columns = read_columns(file, None, folder=located(""))
     if len(columns) != 1:
-        raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
+        raise InputError(f"{file}: has {len(columns)} columns - give one, with a header line")
     return next(iter(columns.values()))
