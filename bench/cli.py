@@ -12,11 +12,12 @@ from gradient_routes.bench.commands.group import Routes
 from gradient_routes.bench.commands.list import list_
 from gradient_routes.bench.commands.merge import merge
 from gradient_routes.bench.commands.report import report
+from gradient_routes.bench.commands.serve import serve
 from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
 from gradient_routes.bench.studies.command import commands_of_studies
 
-OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline, environments]
+OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline, environments, serve]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
 

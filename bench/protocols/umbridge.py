@@ -21,30 +21,24 @@ class UMBridge:
     derivative.
     """
 
-    start: Array | None = None
-
     def __init__(self, url: str, name: str, config: Mapping[str, Any]) -> None:
         self.server, self.who = Server(url), f"umbridge:{url}"
         self.model = {"name": self._known(name), "config": dict(config)}
         self.who += f"#{self.model['name']}"
-        self.supports = [what for what, has in self._told("ModelInfo", "support", dict).items() if has is True]
+        info = self._answer("ModelInfo", self.model)
+        self.supports = [what for what, has in self._told(info, "ModelInfo", "support", dict).items() if has is True]
         if "Evaluate" not in self.supports or not {"Gradient", "ApplyJacobian"} & {*self.supports}:
             offers = ", ".join(self.supports) or "nothing"
             raise InputError(
                 f"{self.who}: offers {offers} - a check needs Evaluate and Gradient, or ApplyJacobian in its place"
             )
         self.inputs, self.outputs = self._sizes("InputSizes"), self._sizes("OutputSizes")
-
-    @property
-    def n_p(self) -> int:
-        return sum(self.inputs)
-
-    @property
-    def names(self) -> list[str] | None:
-        """Of the components of p; None where they are numbered."""
-        if len(self.inputs) == 1:
-            return None
-        return [f"p_{j + 1}_{i + 1}" for j, size in enumerate(self.inputs) for i in range(size)]
+        self.n_p = sum(self.inputs)
+        start, names = info.get("start"), info.get("names")  # those of `routes serve` tell them
+        self.start = None if start is None else self._numbers(start, self.n_p, "start")
+        self.names = self._numbered()
+        if isinstance(names, list) and len(names) == self.n_p:
+            self.names = [*map(str, names)]
 
     def value(self, p: Array) -> Array:
         """F(p), (m,). Raises NoValue."""
@@ -79,6 +73,12 @@ class UMBridge:
                 by_output[i] += self._numbers(F_p_v, size, f"ApplyJacobian of output {i + 1} by input {j + 1}")
         return np.concatenate(by_output)
 
+    def _numbered(self) -> list[str] | None:
+        """Names of the components of p by block; None where there is one block."""
+        if len(self.inputs) == 1:
+            return None
+        return [f"p_{j + 1}_{i + 1}" for j, size in enumerate(self.inputs) for i in range(size)]
+
     def _known(self, name: str) -> str:
         info = self._answer("Info")
         version, names = info.get("protocolVersion"), info.get("models")
@@ -92,13 +92,14 @@ class UMBridge:
         raise InputError(f"{self.who}: {asked} - there are {there}: give umbridge:URL#MODEL")
 
     def _sizes(self, endpoint: str) -> list[int]:
-        sizes: list[int] = self._told(endpoint, f"{endpoint[0].lower()}{endpoint[1:]}", list)
+        answer = self._answer(endpoint, self.model)
+        sizes: list[int] = self._told(answer, endpoint, f"{endpoint[0].lower()}{endpoint[1:]}", list)
         if not sizes or not all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in sizes):
             raise InputError(f"{self.who}: {endpoint} are {sizes} - a check needs one block, of one number, at least")
         return sizes
 
-    def _told(self, endpoint: str, what: str, kind: type) -> Any:
-        found = self._answer(endpoint, self.model).get(what)
+    def _told(self, answer: dict[str, Any], endpoint: str, what: str, kind: type) -> Any:
+        found = answer.get(what)
         if not isinstance(found, kind):
             raise InputError(f"{self.who}: {endpoint} tells no {what} - is it a server of UM-Bridge?")
         return found

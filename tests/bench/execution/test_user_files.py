@@ -65,11 +65,11 @@ RUNNERS = ("run", "scaling")  # the others are confined as a whole
 
 
 def measuring() -> dict[str, tuple[str, ...]]:
-    """Every verb that takes a problem, and how a file is named to it."""
+    """Every verb that takes a problem, but for the server, which is a process of its own; and how a file is named."""
     found = {}
     for name, command in main.commands.items():
         options = {p.name for p in command.params if isinstance(p, click.Option)}
-        if {"selector", "problem", "problems"} & options:
+        if {"selector", "problem", "problems"} & options and name != "serve":
             needed = [p for p in command.params if p.required and p.name == "routes"]
             found[name] = ("--route", "adjoint") if needed or name in ("check", "vcurve") else ()
     return found
