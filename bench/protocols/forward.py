@@ -49,11 +49,11 @@ def subject(F: Forward, at: Array | None, data: Array | None, seed: int) -> Subj
     if p is None:
         raise InputError(f"{F.who}: has no start - give the point, {F.n_p} values, with --at FILE.csv")
     if len(p) != F.n_p:
-        raise InputError(f"{F.who}: p has {len(p)} values, the model has {F.n_p} inputs - give {F.n_p}")
+        raise InputError(f"{F.who}: p has {len(p)} values, n_p = {F.n_p} - give {F.n_p}")
     size = _size(F, p)
     m = 1 if size is None else len(size)
     if data is not None and size is not None and len(data) != m:
-        raise InputError(f"{F.who}: {len(data)} data, the model has {m} outputs - give {m}")
+        raise InputError(f"{F.who}: {len(data)} data, F(p) has m = {m} - give {m}")
     weights = np.ones(m)
     if size is not None and m > 1:
         weights = np.random.default_rng(seed).standard_normal(m) / np.where(size > 0.0, size, 1.0)

@@ -1,4 +1,4 @@
-"""The foreign model that `umbridge:URL#MODEL` names."""
+"""The foreign model that `umbridge:URL#MODEL` or `tesseract:FILE|URL` names."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.protocols.forward import Forward
+from gradient_routes.bench.protocols.tesseract import TesseractModel
 from gradient_routes.bench.protocols.umbridge import UMBridge
 from gradient_routes.problems.errors import InputError
 
-PROTOCOLS = ("umbridge:",)
+PROTOCOLS = ("umbridge:", "tesseract:")
 
 
 def is_foreign(target: str | None) -> bool:
@@ -20,8 +21,12 @@ def is_foreign(target: str | None) -> bool:
 
 def forward(target: str, config: str | None) -> Forward:
     """Given the content of the file `config`. Raises InputError."""
-    url, _, name = target.partition(":")[2].partition("#")
-    return UMBridge(url, name, {} if config is None else _object(config))
+    protocol, _, address = target.partition(":")
+    given = None if config is None else _object(config)
+    if protocol == "tesseract":
+        return TesseractModel(address, given)
+    url, _, name = address.partition("#")
+    return UMBridge(url, name, given or {})
 
 
 def _object(file: str) -> dict[str, Any]:

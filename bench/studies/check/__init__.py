@@ -15,9 +15,9 @@ from gradient_routes.bench.verification.columns import CHECKS, POINTS
 
 ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too strict."
 PAGE = f"Write the verdict and its curves there. {replaces('.html')}"
-CONFIG = "UM-Bridge: the model's config."
-DATA = "UM-Bridge: J = 1/2 |F(p) - d|^2 with these data d, a header line and m values."
-PROTOCOLS = ("umbridge:",)
+CONFIG = 'UM-Bridge: the model\'s config; Tesseract: {"inputs": {..}}, p among them.'
+DATA = "UM-Bridge, Tesseract: J = 1/2 |F(p) - d|^2 with these data d, a header line and m values."
+PROTOCOLS = ("umbridge:", "tesseract:")
 HTML = click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help=PAGE)
 QUESTION = ("problem", "route", "at")
 TABLES = {"checks": Table(CHECKS, QUESTION), "points": Table(POINTS, QUESTION)}
@@ -46,13 +46,14 @@ STUDY = Study(
     routes check --problem block --route adjoint
     routes check --problem bar --adapter mine.py  another code, by its adapter
     routes check umbridge:http://localhost:4242#forward --at p.csv
+    routes check tesseract:my_tesseract --config inputs.json
     routes check --problem my_problem.py:Spring   the contract: shapes, derivatives, transposes, work
 
     The object may offer value_and_gradient(p) instead, and scale, bounds, names, tighten(factor), active_set(p).
 
     Exit code: 0 agrees, 1 wrong-gradient or inconsistent-discretization, 3 inconclusive, 2 wrong usage.""",
     options=(
-        click.argument("target", required=False, metavar="[FILE.py:NAME|umbridge:URL#MODEL]"),
+        click.argument("target", required=False, metavar="[FILE.py:NAME|umbridge:URL#MODEL|tesseract:FILE|URL]"),
         click.option("--objective", metavar="FILE.py:NAME", help="A function J(p), in place of an object."),
         click.option("--gradient", metavar="FILE.py:NAME", help="A function dJ/dp(p) -> (n_p,), beside --objective."),
         click.option("--problem", metavar="SELECTOR", help="A problem, or FILE.py:NAME; without --route its contract."),
@@ -70,7 +71,7 @@ STUDY = Study(
     ),
     rules=(
         Rule(("rtol", "max_steps", "linear_solver", "newton"), _registered, "is for registered problems"),
-        Rule(("config", "data"), _foreign, "is for models of UM-Bridge"),
+        Rule(("config", "data"), _foreign, "is for models of UM-Bridge and Tesseract"),
         Rule(("budget", "accept", "seed", "html", "no_plot", "store"), _judged, "is for verdicts, a contract has none"),
     ),
     tables=TABLES,

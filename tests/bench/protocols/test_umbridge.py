@@ -65,8 +65,8 @@ def test_no_value_is_said_as_the_model_says_it(check, model: str) -> None:
             "#values: offers Evaluate - a check needs Evaluate and Gradient, or ApplyJacobian in its place",
         ),
         ("#right", (), "#right: has no start - give the point, 5 values, with --at FILE.csv"),
-        ("#right", ("--at=short.csv",), "#right: p has 2 values, the model has 5 inputs - give 5"),
-        ("#right", ("--at=p.csv", "--data=short.csv"), "#right: 2 data, the model has 3 outputs - give 3"),
+        ("#right", ("--at=short.csv",), "#right: p has 2 values, n_p = 5 - give 5"),
+        ("#right", ("--at=p.csv", "--data=short.csv"), "#right: 2 data, F(p) has m = 3 - give 3"),
         ("#right", ("--at=p.csv", "--config=p.csv"), "p.csv: is no JSON: Expecting value"),
         ("#right", ("--at=p.csv", "--config=list.json"), "list.json: is no JSON object"),
         ("#right", ("--at=p.csv", "--config=none.json"), "none.json: cannot be read: No such file or directory"),
@@ -101,4 +101,4 @@ def test_an_address_without_a_server_says_so(cli, address: str, says: str) -> No
 
 def test_options_of_models_are_refused_elsewhere(cli) -> None:
     ran = cli("check", "--problem=bar", "--route=adjoint", "--config=c.json")
-    assert (ran.code, ran.err) == (2, "routes: --config: is for models of UM-Bridge - leave it out\n")
+    assert (ran.code, ran.err) == (2, "routes: --config: is for models of UM-Bridge and Tesseract - leave it out\n")
