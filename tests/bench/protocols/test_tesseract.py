@@ -50,7 +50,7 @@ def test_a_right_gradient_agrees_by_whatever_it_has(cli, tmp_path: Path, without
 
 def test_a_flipped_sign_of_a_stiff_modulus_is_found(cli, tmp_path: Path) -> None:
     """tesseract-runtime check-gradients passes it: findings/tesseract-flipped-signs.sh."""
-    found = json.loads(check(cli, source(tmp_path, "sign")).out)
+    found = json.loads(check(cli, source(tmp_path, "sign"), "--budget=240").out)
     assert (found["verdict"], found["culprit"]) == ("wrong-gradient", "component groups.[0].E_2, off by its sign")
 
 
