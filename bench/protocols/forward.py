@@ -15,6 +15,7 @@ from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
+LEAST = 1e-6  # of the largest output: a smaller one, which may be rounding, counts less
 ALIKE = 1e-6  # relative: what solvers leave in products with dF/dp and its transpose
 
 
@@ -43,7 +44,8 @@ class Forward(Protocol):
 def subject(F: Forward, at: Array | None, data: Array | None, seed: int) -> Subject:
     """J(p) = 1/2 |F(p) - d|^2 where data d (m,) are given, F(p) where that is one number, else w . F(p).
 
-    w_k is random, of the size of 1 / F_k at the start: all outputs count alike. Raises InputError.
+    w_k is random, of the size of 1 / F_k at the start: outputs count alike, but for those that may be rounding. Raises
+    InputError.
     """
     p = F.start if at is None else at
     if p is None:
@@ -56,7 +58,8 @@ def subject(F: Forward, at: Array | None, data: Array | None, seed: int) -> Subj
         raise InputError(f"{F.who}: {len(data)} data, F(p) has m = {m} - give {m}")
     weights = np.ones(m)
     if size is not None and m > 1:
-        weights = np.random.default_rng(seed).standard_normal(m) / np.where(size > 0.0, size, 1.0)
+        least = LEAST * size.max() or 1.0
+        weights = np.random.default_rng(seed).standard_normal(m) / np.maximum(size, least)
 
     def by_F(q: Array) -> Array:
         """dJ/dF, (m,)."""

@@ -178,7 +178,9 @@ class Handler(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > LONGEST:
             self.close_connection = True  # what follows is not read
-            self._say(413, {"error": {"type": "InvalidInput", "message": f"a request has at most {LONGEST} bytes"}})
+            self._say(
+                413, {"error": {"type": "InvalidInput", "message": f"give a Content-Length of at most {LONGEST} bytes"}}
+            )
             return
         try:
             self._answer(json.loads(self.rfile.read(int(length))))

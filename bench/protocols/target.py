@@ -12,14 +12,8 @@ from gradient_routes.bench.protocols.tesseract import TesseractModel
 from gradient_routes.bench.protocols.umbridge import UMBridge
 from gradient_routes.problems.errors import InputError
 
-PROTOCOLS = ("umbridge:", "tesseract:")
 
-
-def is_foreign(target: str | None) -> bool:
-    return target is not None and target.startswith(PROTOCOLS)
-
-
-def forward(target: str, config: str | None) -> Forward:
+def model_of(target: str, config: str | None) -> Forward:
     """Given the content of the file `config`. Raises InputError."""
     protocol, _, address = target.partition(":")
     given = None if config is None else _object(config)

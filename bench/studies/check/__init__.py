@@ -9,6 +9,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Options, Rule, Study
 from gradient_routes.bench.command_options import at_option, replaces, solver_options
+from gradient_routes.bench.protocols import is_foreign
 from gradient_routes.bench.ranges import FROM_ZERO, MANY, SEED
 from gradient_routes.bench.studies.data_options import data_options
 from gradient_routes.bench.verification.columns import CHECKS, POINTS
@@ -17,7 +18,6 @@ ACCEPT = "Relative error of the gradient that is good enough, where 1e-7 is too 
 PAGE = f"Write the verdict and its curves there. {replaces('.html')}"
 CONFIG = 'UM-Bridge: the model\'s config; Tesseract: {"inputs": {..}}, p among them.'
 DATA = "UM-Bridge, Tesseract: J = 1/2 |F(p) - d|^2 with these data d, a header line and m values."
-PROTOCOLS = ("umbridge:", "tesseract:")
 HTML = click.option("--html", type=click.Path(path_type=Path), metavar="FILE", help=PAGE)
 QUESTION = ("problem", "route", "at")
 TABLES = {"checks": Table(CHECKS, QUESTION), "points": Table(POINTS, QUESTION)}
@@ -33,7 +33,7 @@ def _judged(given: Options) -> bool:
 
 
 def _foreign(given: Options) -> bool:
-    return (given["target"] or "").startswith(PROTOCOLS)
+    return is_foreign(given["target"])
 
 
 STUDY = Study(

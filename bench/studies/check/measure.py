@@ -9,9 +9,8 @@ from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.imported import imported
 from gradient_routes.bench.cases.study import Found, Say
-from gradient_routes.bench.protocols import forward
-from gradient_routes.bench.protocols.target import forward as foreign_model
-from gradient_routes.bench.protocols.target import is_foreign
+from gradient_routes.bench.protocols import forward, is_foreign
+from gradient_routes.bench.protocols.target import model_of
 from gradient_routes.bench.studies.check.conclude import conclude, page_writable
 from gradient_routes.bench.studies.options import one_route, problem_at
 from gradient_routes.bench.verification import adapter as by_adapter
@@ -66,15 +65,15 @@ def run(
         made, p = problem_at(problem, at)
         asked = by_adapter.subject(made, command_of(adapter), adapter, p, solver)
     elif target is not None and is_foreign(target):
-        asked = forward.subject(
-            foreign_model(target, config), _start(at), None if data is None else _column(data), seed
-        )
+        asked = forward.subject(model_of(target, config), _start(at), None if data is None else _column(data), seed)
     else:
         asked = _subject(target, objective, gradient, problem, route, at, solver)
     page_writable(html, kept, [target, objective, gradient, problem, route, config, data, at])
     with stdout_to_stderr():
         found = check(asked, plan, accept)
-    named = {"problem": problem or target or f"{objective} {gradient}", "route": route or adapter, "at": at}
+    beside = [f"--{name} {file}" for name, file in (("config", config), ("data", data)) if file is not None]
+    own = " ".join([target, *beside]) if target is not None else f"{objective} {gradient}"
+    named = {"problem": problem or own, "route": route or adapter, "at": at}
     return conclude(say, found, named, html)
 
 

@@ -9,6 +9,7 @@ import signal
 import socket
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -27,15 +28,21 @@ BAR = Bar(n=4, alpha=0.3)
 P = np.array([0.1, -0.2, 0.3, 0.05])
 
 
-@pytest.fixture(scope="module")
-def url() -> Iterator[str]:
-    (route,) = case.routes(["adjoint"])
+@contextmanager
+def serving(selector: str) -> Iterator[str]:
+    (route,) = case.routes([selector])
     with Server("127.0.0.1", 0, Offered(models(BAR, route, Solver()), BAR.parameters, "bar")) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
         thread.start()
         yield server.url
         server.shutdown()
         thread.join()
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    with serving("adjoint") as address:
+        yield address
 
 
 def asked(url: str, endpoint: str, body: bytes, **headers: str) -> tuple[int, Any]:
@@ -55,6 +62,13 @@ def test_the_judge_agrees_at_the_start_that_the_server_tells(cli, url: str, mode
     assert re.search(r"^log E_1 +agrees", ran.out, re.MULTILINE)
     (off,) = re.findall(r"^w \. \(dF/dp v\) = \(dF/dp\)\^T w \. v +(\S+)", ran.out, re.MULTILINE)
     assert float(off) < 1e-12  # of a direct solver
+
+
+def test_a_wrong_route_is_served_as_wrong_and_found(cli) -> None:
+    with serving("faulty-adjoint[fault=sign]") as url:
+        ran = cli("check", f"umbridge:{url}#objective", "--no-store", "--no-plot")
+    assert ran.code == 1
+    assert "the whole gradient are off by its sign" in ran.out
 
 
 def test_the_client_of_umbridge_gets_our_numbers(url: str) -> None:
