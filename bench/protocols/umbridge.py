@@ -34,11 +34,18 @@ class UMBridge:
             )
         self.inputs, self.outputs = self._sizes("InputSizes"), self._sizes("OutputSizes")
         self.n_p = sum(self.inputs)
-        start, names = info.get("start"), info.get("names")  # those of `routes serve` tell them
+        start = info.get("start")  # those of `routes serve` tell it, and the names
         self.start = None if start is None else self._numbers(start, self.n_p, "start")
-        self.names = self._numbered()
-        if isinstance(names, list) and len(names) == self.n_p:
-            self.names = [*map(str, names)]
+        self._names = info.get("names")
+
+    @property
+    def names(self) -> list[str] | None:
+        """Of the components of p, by input where there are several; None where they are numbered."""
+        if isinstance(self._names, list) and len(self._names) == self.n_p:
+            return [*map(str, self._names)]
+        if len(self.inputs) == 1:
+            return None
+        return [f"p_{j + 1}_{i + 1}" for j, size in enumerate(self.inputs) for i in range(size)]
 
     def value(self, p: Array) -> Array:
         """F(p), (m,). Raises NoValue."""
@@ -72,12 +79,6 @@ class UMBridge:
                 F_p_v = self._asked("ApplyJacobian", p, outWrt=i, inWrt=j, vec=v_j.tolist())
                 by_output[i] += self._numbers(F_p_v, size, f"ApplyJacobian of output {i + 1} by input {j + 1}")
         return np.concatenate(by_output)
-
-    def _numbered(self) -> list[str] | None:
-        """Names of the components of p by block; None where there is one block."""
-        if len(self.inputs) == 1:
-            return None
-        return [f"p_{j + 1}_{i + 1}" for j, size in enumerate(self.inputs) for i in range(size)]
 
     def _known(self, name: str) -> str:
         info = self._answer("Info")

@@ -71,6 +71,7 @@ def test_no_value_is_said_as_the_model_says_it(check, model: str) -> None:
         ("#right", ("--at=p.csv", "--config=list.json"), "list.json: is no JSON object"),
         ("#right", ("--at=p.csv", "--config=none.json"), "none.json: cannot be read: No such file or directory"),
         ("#right", ("--at=true",), "--at true is for registered problems"),
+        ("/next#right", (), "/next: speaks version 2.0 of UM-Bridge, this is 1.0 - renew the server"),
         ("/elsewhere#right", (), "is it a server of UM-Bridge?"),
     ],
 )

@@ -43,6 +43,8 @@ def F_p(x: Any) -> Any:
 
 
 def answer(endpoint: str, asked: dict[str, Any]) -> tuple[int, bytes]:
+    if endpoint == "next/Info":
+        return 200, b'{"protocolVersion": 2.0, "models": ["right"]}'
     if endpoint == "Info":
         return 200, json.dumps(
             {"protocolVersion": 1.0, "models": ["right", "sign", "forward", "values", *ODD]}
