@@ -48,7 +48,7 @@ class Offered:
         if endpoint == "Info":
             return {"protocolVersion": VERSION, "models": [*self.models]}
         if endpoint not in ANSWERS:
-            raise Refused("NotFound", f"no endpoint {endpoint} - there are Info, {', '.join(ANSWERS)}", 404)
+            raise Refused("NotFound", f"no endpoint '{endpoint}' - there are Info, {', '.join(ANSWERS)}", 404)
         if not isinstance(asked, dict):
             raise Refused("InvalidInput", "the request is no JSON object")
         name = asked.get("name")
@@ -85,7 +85,11 @@ class Offered:
         blocks = asked.get("input")
         if not isinstance(blocks, list) or len(blocks) != 1:
             raise Refused("InvalidInput", "input is not a list of one list: there is one block of parameters")
-        return _numbers(blocks[0], len(self.parameters), "input 0")
+        p = _numbers(blocks[0], len(self.parameters), "input 0")
+        try:
+            return self.parameters.check(p, self.who)
+        except DomainError as failure:
+            raise Refused("DomainError", str(failure)) from None
 
     def _vector(self, asked: dict[str, Any], name: str, length: int) -> Array:
         """`sens` or `vec`, of the only output and the only input."""

@@ -17,9 +17,11 @@ import pytest
 from commands import Shell, ended
 
 from gradient_routes.bench.cases import case
-from gradient_routes.bench.protocols.served import models
-from gradient_routes.bench.protocols.server import Offered, Server
+from gradient_routes.bench.protocols.served import Served, models
+from gradient_routes.bench.protocols.server import Offered, Refused, Server
 from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.errors import NotConverged
+from gradient_routes.problems.problem import Array, Parameters
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.sensitivity import sensitivities
@@ -88,14 +90,14 @@ def test_the_client_of_umbridge_gets_our_numbers(url: str) -> None:
     np.testing.assert_allclose(S_u([P.tolist()])[0], state.u[:m], rtol=1e-14)
     np.testing.assert_allclose(S_u.gradient(0, 0, [P.tolist()], w.tolist()), H.T @ w, rtol=1e-12)
     np.testing.assert_allclose(S_u.apply_jacobian(0, 0, [P.tolist()], P.tolist()), H @ P, rtol=1e-12)
-    with pytest.raises(Exception, match=r"SingularMatrix: bar: stiffness 0 of element 1 is not positive"):
+    with pytest.raises(Exception, match=r"DomainError: bar: log E_1 = -1e\+308 is outside"):
         J([[-1e308] * 4])
 
 
 P_1 = [[0.0] * 4]
 REFUSED: dict[str, tuple[str, dict[str, Any], int, str]] = {
     "no model": ("Evaluate", {"name": "nope", "input": P_1}, 400, "no model nope - there are objective, observations"),
-    "endpoint": ("ApplyHessian", {"name": "objective"}, 404, "no endpoint ApplyHessian - there are Info, ModelInfo"),
+    "endpoint": ("ApplyHessian", {"name": "objective"}, 404, "no endpoint 'ApplyHessian' - there are Info, ModelInfo"),
     "config": ("Evaluate", {"name": "objective", "input": P_1, "config": {"level": 1}}, 400, "has no config"),
     "blocks": ("Evaluate", {"name": "objective", "input": P_1 * 2}, 400, "input is not a list of one list"),
     "length": ("Evaluate", {"name": "objective", "input": [[0.0] * 3]}, 400, "input 0 is a list of 3, not a list of 4"),
@@ -124,6 +126,29 @@ def test_a_wrong_request_is_refused_with_its_reason(url: str, what: str) -> None
     code, answer = asked(url, endpoint, json.dumps(message).encode())
     assert code == status
     assert says in answer["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("p", "status", "says"),
+    [
+        (-1.0, 400, "black: p_1 = -1 is outside 0 < p_1"),
+        (1.0, 500, "black: the result is not finite"),
+        (2.0, 500, "black: 50 steps"),
+        (3.0, 500, "black: KeyError: 'mesh'"),
+    ],
+)
+def test_a_p_without_a_value_is_an_error_not_a_number(p: float, status: int, says: str) -> None:
+    def value(p: Array) -> Array:
+        failures = {2.0: NotConverged("black: 50 steps", ()), 3.0: KeyError("mesh")}
+        if p[0] in failures:
+            raise failures[p[0]]
+        return np.array([np.inf])
+
+    model = Served(1, value, lambda p, w: p, lambda p, v: p)
+    offered = Offered({"objective": model}, Parameters(np.ones(1), np.ones(1), lower=0.0), "black")
+    with pytest.raises(Refused, match=says) as refused:
+        offered.answer("Evaluate", {"name": "objective", "input": [[p]]})
+    assert refused.value.status == status
 
 
 def test_what_is_no_request_is_refused(url: str) -> None:

@@ -8,10 +8,12 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from gradient_routes.bench.protocols import tesseract
 from gradient_routes.bench.protocols.pytree import decoded, leaves, replaced
 
 SPRINGS = Path(__file__).parent / "springs_tesseract.py"
@@ -131,6 +133,13 @@ def test_one_without_derivatives_says_what_is_needed(cli, tmp_path: Path) -> Non
     ran = check(cli, source(tmp_path, without=ENDPOINTS))
     assert ran.code == 2
     assert "has no derivatives - a check needs vector_jacobian_product, jacobian or jacobian_vector_product" in ran.err
+
+
+def test_one_that_does_not_tell_what_is_differentiable_says_so(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tesseract, "_opened", lambda *_: SimpleNamespace(openapi_schema={"paths": {}}))
+    ran = cli("check", "tesseract:http://old")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "does not tell what is differentiable - build it with tesseract-core 1.15" in ran.err
 
 
 def test_a_missing_package_is_one_line_with_the_command(cli, monkeypatch: pytest.MonkeyPatch) -> None:
