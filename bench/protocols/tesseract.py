@@ -140,9 +140,11 @@ def _opened(address: str, who: str) -> Any:
     if address.startswith(("http://", "https://")):
         try:
             Server(address).ask("health")
-            return Tesseract.from_url(address)
-        except NoValue as error:
-            raise InputError(f"{who}: {error} - is it a Tesseract?") from None
+            return Tesseract.from_url(address).with_encoding(output_format="json+base64")  # plain JSON has no inf
+        except InputError:
+            raise
+        except FOREIGN as failure:
+            raise InputError(f"{who}: {_said(failure)} - is it a Tesseract?") from failure
     path = located(address)
     path = path / SOURCE if path.is_dir() else path
     if not path.is_file():

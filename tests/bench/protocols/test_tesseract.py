@@ -35,7 +35,7 @@ def source(folder: Path, fault: str = "none", without: tuple[str, ...] = ()) -> 
 
 
 def check(cli, target: object, *more: str):
-    return cli("check", f"tesseract:{target}", "--config=inputs.json", "--budget=100", "--no-store", "--json", *more)
+    return cli("check", f"tesseract:{target}", "--config=inputs.json", "--budget=60", "--no-store", "--json", *more)
 
 
 @pytest.mark.parametrize(

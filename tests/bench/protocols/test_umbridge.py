@@ -42,6 +42,13 @@ def test_a_flipped_sign_is_found_also_beside_its_jacobian(check) -> None:
     assert not products["sound"]
 
 
+def test_a_wrong_product_beside_a_right_gradient_is_said(check) -> None:
+    found = json.loads(check("product").out)
+    assert found["verdict"] == "agrees"
+    assert "but w . (dF/dp v) = (dF/dp)^T w . v: " in found["says"]
+    assert found["next"] == "look at w . (dF/dp v) = (dF/dp)^T w . v"
+
+
 def test_products_with_the_jacobian_are_a_gradient(check) -> None:
     assert json.loads(check("forward").out)["verdict"] == "agrees"
 
@@ -57,8 +64,8 @@ def test_no_value_is_said_as_the_model_says_it(check, model: str) -> None:
 @pytest.mark.parametrize(
     ("target", "more", "says"),
     [
-        ("#nope", (), "no model 'nope' - there are right, sign, forward, values,"),
-        ("", (), "12 models - there are right, sign,"),
+        ("#nope", (), "no model 'nope' - there are right, sign, product, forward, values,"),
+        ("", (), "13 models - there are right, sign,"),
         (
             "#values",
             (),

@@ -47,7 +47,7 @@ def answer(endpoint: str, asked: dict[str, Any]) -> tuple[int, bytes]:
         return 200, b'{"protocolVersion": 2.0, "models": ["right"]}'
     if endpoint == "Info":
         return 200, json.dumps(
-            {"protocolVersion": 1.0, "models": ["right", "sign", "forward", "values", *ODD]}
+            {"protocolVersion": 1.0, "models": ["right", "sign", "product", "forward", "values", *ODD]}
         ).encode()
     if "name" not in asked:
         return 404, b"404: Not Found"
@@ -66,6 +66,7 @@ def answer(endpoint: str, asked: dict[str, Any]) -> tuple[int, bytes]:
     rows, columns = slice(2 * asked["outWrt"], 2 + asked["outWrt"]), slice(3 * asked["inWrt"], 3 + 2 * asked["inWrt"])
     A = F_p(x)
     if endpoint == "ApplyJacobian":
+        A[:, 1] *= -1.0 if name == "product" else 1.0
         return 200, json.dumps({"output": (A[rows, columns] @ asked["vec"]).tolist()}).encode()
     A[:, 1] *= -1.0 if name == "sign" else 1.0
     return 200, json.dumps({"output": (A[rows, columns].T @ asked["sens"]).tolist()}).encode()
