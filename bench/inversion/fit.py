@@ -108,7 +108,7 @@ def _stated(problem: Problem, p: Array, H: Array, scale: Array, sigma: float) ->
         return {}
     step = 1e-30
     by_x = np.array([[v.imag / step for v in problem.stated(p + 1j * step * e).values()] for e in np.diag(scale)]).T
-    R = np.linalg.qr(H, mode="r")
+    R = np.asarray(np.linalg.qr(H, mode="r"))
     if np.linalg.cond(R) > 1.0 / posterior.EPS:
         return {name: (float(value.real), np.nan) for name, value in values.items()}
     sd = sigma * np.linalg.norm(np.linalg.solve(R.T, by_x.T), axis=0)

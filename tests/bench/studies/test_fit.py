@@ -1,0 +1,75 @@
+"""What is said of measured data: residuals against noise, outliers, error bars in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gradient_routes.bench.cases.case import problems, routes
+from gradient_routes.bench.inversion.fit import Residuals
+from gradient_routes.bench.inversion.invert import Engine, invert
+from gradient_routes.problems.data.observation import Observation
+
+SIGMA = 1e-3
+
+
+def residuals(r: np.ndarray, sigma: float) -> Residuals:
+    return Residuals.of(Observation(r, np.zeros(len(r)), None, sigma=sigma))
+
+
+def test_noise_explains_residuals_of_its_size_with_and_without_outliers() -> None:
+    r = SIGMA * np.random.default_rng(0).standard_normal(1000)
+    plain = residuals(r, SIGMA)
+    assert (plain.outliers, plain.exceed) == (0, False)
+    assert plain.rms == plain.inner_rms == pytest.approx(SIGMA, rel=0.1)
+    r[:20] = 0.1
+    spoilt = residuals(r, SIGMA)
+    assert (spoilt.outliers, spoilt.exceed) == (20, False)
+    assert spoilt.rms > 10 * spoilt.inner_rms
+    assert "with 20 outliers of 1000; noise 0.001" in spoilt.described
+
+
+def test_residuals_of_three_times_the_noise_exceed_it() -> None:
+    found = residuals(3.0 * SIGMA * np.random.default_rng(0).standard_normal(1000), SIGMA)
+    assert found.exceed
+    assert found.described.startswith("misfit exceeds noise: residuals of rms 0.00")
+    assert not residuals(np.ones(10), 0.0).exceed, "noise that is not stated is not exceeded"
+
+
+def test_error_bars_of_one_modulus_are_the_closed_form(tmp_path) -> None:
+    """u = F L / (A E), so sd(E) = sigma E^2 at F = L = A = 1."""
+    (tmp_path / "d.csv").write_text("node,displacement\n1,0.25\n")
+    (spec,) = problems([f"bar[n=1,parametrization=raw,data={tmp_path}/d.csv,noise={SIGMA}]"])
+    found = invert(spec, routes(["adjoint"])[0], Engine())
+    assert found.p == pytest.approx([4.0], rel=1e-7)
+    assert found.fit is not None
+    assert found.fit.sd == pytest.approx([SIGMA * 16.0], rel=1e-6)
+    assert found.tables["estimates"][0]["sd"] == found.fit.sd[0]
+    assert not found.unexplained
+
+
+STRETCHED = "plate[n=2,law=linear,unknown=constants,traction=0.1,noise=1e-5,data=d.csv]"
+
+
+def test_E_and_nu_are_stated_with_error_bars_and_a_misfit_is_flagged(cli, tmp_path) -> None:
+    """Plane stress of a patch held by a roller: ux = -nu t x / E, uy = t y / E; then data that nothing explains."""
+    E, nu, t = 2.0, 0.25, 0.1
+    points = [(x, y) for x in (0.1, 0.4, 0.8) for y in (0.3, 0.7, 1.0)]
+    noise = np.random.default_rng(4).standard_normal((len(points), 2)) * 1e-5
+    held = "clamped=none,fixed='x@left,y@bottom'".replace("'", "")
+    selector = STRETCHED.replace("n=2,", f"n=2,{held},")
+    for wrong in (0.0, 0.02):
+        lines = ["x,y,ux,uy"]
+        for (x, y), (a, b) in zip(points, noise, strict=True):
+            lines.append(f"{x},{y},{-nu * t * x / E + a + wrong * (y - 0.5) ** 2},{t * y / E + b}")
+        (tmp_path / "d.csv").write_text("\n".join(lines))
+        ran = cli("invert", "--problem", selector, "--no-store", "--no-plot")
+        assert ran.code == (1 if wrong else 0), ran.out + ran.err
+        assert ("misfit exceeds noise" in ran.out) == bool(wrong)
+        if not wrong:
+            (line,) = [line for line in ran.out.splitlines() if line.startswith("E [Pa]")]
+            got = [float(word.strip(",")) for word in line.replace("+-", "").split() if word[0].isdigit()]
+            (E_found, sd_E, nu_found, sd_nu) = got
+            assert abs(E_found - E) < 4 * sd_E
+            assert abs(nu_found - nu) < 4 * sd_nu
+            assert 0.0 < sd_E < 1e-2
