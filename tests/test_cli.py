@@ -352,7 +352,7 @@ def test_version_says_version_commit_and_python(cli, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        ("run --problem ", {"bar", "block", "advection", "all"}),
+        ("run --problem ", {"bar", "block", "plate", "advection", "all"}),
         ("run --problem bar --route f", {"fd-one-sided", "fd-central", "faulty-adjoint"}),
         ("vcurve --problem b", {"bar", "block"}),
         ("run --problem ./my_m", {"./my_m"}),

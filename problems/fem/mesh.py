@@ -62,6 +62,12 @@ class Mesh:
     def boundaries(self) -> dict[str, Array]:
         return {str(name): np.asarray(facets) for name, facets in (self.skfem_mesh.boundaries or {}).items()}
 
+    @cached_property
+    def regions(self) -> dict[str, Array]:
+        """The numbers of the cells of each region that the mesh file names."""
+        named = self.skfem_mesh.subdomains or {}
+        return {str(name): np.asarray(cells) for name, cells in named.items() if not str(name).startswith("gmsh:")}
+
     def boundary(self, where: str) -> Facets:
         """Boundary facets by name: top, z=0.5, or a name in the mesh file. Raises InputError."""
         facets = self.boundaries.get(where)

@@ -16,13 +16,14 @@ from gradient_routes.problems.problem import Array, Parameters
 if TYPE_CHECKING:
     from gradient_routes.problems.mechanics.materials import MaterialLaw
 
-DesignName = Literal["modulus", "layers", "constants", "traction", "shape", "load"]
-PlaneDesign = Literal["modulus", "layers", "constants", "thickness", "traction", "shape", "load"]
+DesignName = Literal["modulus", "layers", "regions", "constants", "traction", "shape", "load"]
+PlaneDesign = Literal["modulus", "layers", "regions", "constants", "thickness", "traction", "shape", "load"]
 AnyDesign = DesignName | PlaneDesign
 CELLWISE: tuple[AnyDesign, ...] = ("modulus", "thickness")
-FIELDS: tuple[AnyDesign, ...] = (*CELLWISE, "layers")
-MATERIAL: tuple[AnyDesign, ...] = (*FIELDS, "constants")
-MODULI: tuple[AnyDesign, ...] = ("modulus", "layers", "constants")
+FIELDS: tuple[AnyDesign, ...] = (*CELLWISE, "layers")  # whose components have neighbours
+MODULI: tuple[AnyDesign, ...] = (*FIELDS, "regions")
+MATERIAL: tuple[AnyDesign, ...] = (*MODULI, "constants")
+FITTED: tuple[AnyDesign, ...] = ("modulus", "layers", "regions", "constants")  # to data: stresses
 MAX_DEFAULT_LAYERS = 4
 THETA_MAX = 300.0  # exp(THETA_MAX) and its square stay in float64's range
 
@@ -133,6 +134,26 @@ def layers(
     return _cellwise(_moduli_q(law, nu), log, E, start, inclusion(middle), layer, position, "E_layer")
 
 
+def regions(mesh: Mesh, law: MaterialLaw, nu: float, log: bool, uniform: bool, E: float) -> DesignVariables:
+    """One Young's modulus per region that the mesh file names. Raises InputError unless each cell is in one of them."""
+    names = list(mesh.regions)
+    centres = mesh.geometry.centres
+    member = np.array([np.isin(np.arange(len(centres)), cells) for cells in mesh.regions.values()])
+    count = member.sum(axis=0) if names else np.zeros(len(centres))
+    wrong = np.flatnonzero(count != 1)
+    if wrong.size:
+        has = ", ".join(names) or "none"
+        raise InputError(
+            f"{mesh.who}: unknown=regions: {wrong.size} of {len(count)} cells are in no region or in several of those"
+            f" that the mesh names ({has}), first cell {wrong[0] + 1} - give each cell one"
+        )
+    region, ones = member.argmax(axis=0), np.ones(len(names))
+    position = np.array([centres[inside].mean(axis=0) for inside in member])
+    x = mesh.normalized(position)
+    start = ones if uniform else default_modulus(x)
+    return _cellwise(_moduli_q(law, nu), log, E, start, inclusion(x), region, position, "E", names=names)
+
+
 def _layer_numbers(height: Array, count: int) -> Array:
     """The layer (n_e,) of cells whose centres lie at a height from 0 to 1."""
     return np.asarray(np.minimum((height * count).astype(int), count - 1))
@@ -152,6 +173,7 @@ def _cellwise(
     position: Array,
     name: str,
     unit: str = "Pa",
+    names: list[str] | None = None,
 ) -> DesignVariables:
     """A value v in each cell e, v[parameter_of_cell[e]], to which the constants q_of(v) are proportional.
 
@@ -171,7 +193,7 @@ def _cellwise(
         lower=-THETA_MAX if log else 0.0,
         upper=THETA_MAX if log else np.inf,
         unit=f"log {unit}" if log else unit,
-        label=(lambda i: f"log {name}_{i + 1}") if log else (lambda i: f"{name}_{i + 1}"),
+        label=lambda i: f"{'log ' if log else ''}{name}_{names[i] if names else i + 1}",
         position=position,
     )
     truth = np.log(truth) if log else truth

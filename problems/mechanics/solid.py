@@ -24,6 +24,7 @@ from gradient_routes.problems.mechanics import design_variables
 from gradient_routes.problems.mechanics.design_variables import (
     CELLWISE,
     FIELDS,
+    FITTED,
     MATERIAL,
     MODULI,
     AnyDesign,
@@ -85,6 +86,7 @@ class Solid(Problem):
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
             "modulus": lambda: design_variables.moduli(mesh, law, o.nu, self.log, uniform, E),
             "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, E, o.layers),
+            "regions": lambda: design_variables.regions(mesh, law, o.nu, self.log, uniform, E),
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
             "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
             "traction": lambda: design_variables.tractions(mesh, top, o.traction),
@@ -110,7 +112,7 @@ class Solid(Problem):
         if measured:
             found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, self.noise)
             self.data = self._from_file(found)
-            self.start_from_data = o.modulus is None and o.unknown in MODULI and not gripped
+            self.start_from_data = o.modulus is None and o.unknown in FITTED and not gripped
         elif o.markers:
             in_plane = o.components == "in-plane"
             self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
@@ -151,7 +153,7 @@ class Solid(Problem):
         f2t = self.mesh.skfem_mesh.f2t
         pairs = np.asarray(f2t.T[f2t[1] != -1]) if unknown in CELLWISE else None
         prior = Prior(alpha, kind, width, pairs, self.parameters.start, self.parameters.scale)
-        if kind == "amplitude" and unknown in FIELDS:
+        if kind == "amplitude" and unknown in MODULI:
             prior = replace(prior, origin=self._theta(self.parameters.start), scale=1.0)
         prior.check(self.name)
         return prior

@@ -11,7 +11,7 @@ from gradient_routes.problems.data.placing import Outside
 from gradient_routes.problems.data.regularization import PHI_WIDTH
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, check_applies
-from gradient_routes.problems.mechanics.design_variables import FIELDS, MATERIAL
+from gradient_routes.problems.mechanics.design_variables import FIELDS, MATERIAL, MODULI
 from gradient_routes.problems.mechanics.loaded_solid import Load
 
 MAX_COUNT = 10**7  # of cells, markers, layers
@@ -97,7 +97,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("load=displacement", gripped, False, {"traction": o.traction != 0.2}),
         ("phi=tv", o.phi == "tv", True, {"phi_width": o.phi_width != PHI_WIDTH}),
         ("unknown=modulus or layers", o.unknown in FIELDS, True, {"phi": o.phi in ("tikhonov", "tv")}),
-        ("unknown=modulus or layers", o.unknown in FIELDS, True, {"parametrization": o.parametrization}),
+        ("unknown=modulus, layers or regions", o.unknown in MODULI, True, {"parametrization": o.parametrization}),
     )
 
 

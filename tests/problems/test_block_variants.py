@@ -279,7 +279,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"unknown": "traction", "load": "follower"}, "one case of load=traction"),
     ({"unknown": "shape", "surface": "top"}, "choose a free surface"),
     ({"unknown": "layers", "layers": 9}, "choose fewer"),
-    ({"unknown": "load", "parametrization": "raw"}, "parametrization needs unknown=modulus or layers"),
+    ({"unknown": "load", "parametrization": "raw"}, "parametrization needs unknown=modulus, layers or regions"),
     ({"cases": 4}, "cases=4"),
     ({"markers": -1}, "markers=-1"),
     ({"noise": 0.1}, "data=twin"),

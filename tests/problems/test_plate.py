@@ -304,6 +304,29 @@ def test_fields_are_in_space_and_data_in_the_plane(tmp_path: Path) -> None:
     assert set(plate.view(p, result.u, None).columns) == {"x", "y"}
 
 
+def test_regions_of_a_mesh_file_have_a_modulus_each(tmp_path: Path) -> None:
+    """The same gradient as that by cells, summed over each region; cells of no region are refused."""
+    path = tmp_path / "two.msh"
+    geometry = rectangle_mesh("plate", "quad4", (2, 2), (1.0, 1.0)).geometry
+    kind, cells = geometry.for_meshio()
+    tags = [np.array([1, 2, 1, 2])]
+    two = {"soft": np.array([1, 2]), "stiff": np.array([2, 2])}  # tag and dimension
+    file = meshio.Mesh(np.pad(geometry.X, ((0, 0), (0, 1))), [(kind, cells)], field_data=two)
+    file.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    file.write(path, file_format="gmsh22", binary=False)
+    options = {"mesh": str(path), "derivatives": "hand"}
+    by_region, by_cell = Plate(**options, unknown="regions", alpha=0.1), Plate(**options)
+    assert [by_region.parameters.label(i) for i in (0, 1)] == ["log E_soft", "log E_stiff"]
+    p = by_region.parameters.start
+    each = adjoint.prepare(Model(by_cell), p[[0, 1, 0, 1]])(p[[0, 1, 0, 1]]).gradient
+    found = adjoint.prepare(Model(by_region), p)(p).gradient  # at its start Phi has no gradient
+    np.testing.assert_allclose(found, [each[0] + each[2], each[1] + each[3]], rtol=1e-11)
+    with pytest.raises(
+        InputError, match=r"4 of 4 cells are in no region .* \(none\), first cell 1 - give each cell one"
+    ):
+        Plate(**HAND, unknown="regions")
+
+
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"thickness": 0.0}, "thickness=0"),
     ({"thickness": float("nan")}, "thickness=nan"),
