@@ -42,6 +42,7 @@ class Block(Solid):
         size: Annotated[str, "lengths Lx,Ly,Lz [m], or one for all"] = "1",
         element: Annotated[SolidElement, "of the box; tetrahedra split each of its bricks in six"] = "hex8",
         mesh: Annotated[str | None, "mesh file of hexahedra or tetrahedra that meshio reads [the box]"] = None,
+        mesh_unit: options.MeshUnit = "m",
         clamped: Annotated[str, "face held: a name (bottom, top, left, ... or the file's) or a plane, z=0"] = "bottom",
         fixed: options.Fixed = None,
         loaded: Annotated[str, "face loaded or gripped"] = "top",
@@ -77,7 +78,7 @@ class Block(Solid):
         from gradient_routes.problems.mechanics.materials import LAWS
 
         if mesh:
-            body = read_mesh("block", mesh)
+            body = read_mesh("block", mesh, mesh_unit)
         else:
             Lx, Ly, Lz = options.lengths("block", size, 3)
             body = box_mesh("block", element, (nx or n, ny or n, nz or n), (Lx, Ly, Lz))

@@ -52,6 +52,7 @@ class Plate(Solid):
         thickness: Annotated[float, "out of the plane [m]"] = 1.0,
         element: Annotated[PlaneElement, "of the body; triangles split each of its quadrilaterals in two"] = "quad4",
         mesh: Annotated[str | None, "mesh file of quadrilaterals or triangles that meshio reads [the body]"] = None,
+        mesh_unit: options.MeshUnit = "m",
         clamped: Annotated[
             str, "edge held: bottom, top, left, right, hole, the file's, a line y=0, or none"
         ] = "bottom",
@@ -94,7 +95,7 @@ class Plate(Solid):
         _check(o)
         from gradient_routes.problems.mechanics.plane_laws import plane_law
 
-        plane = read_mesh("plate", mesh, dim=2) if mesh else _built_in(o)
+        plane = read_mesh("plate", mesh, mesh_unit, dim=2) if mesh else _built_in(o)
         section = replace(plane.geometry, thickness=float(thickness), axisymmetric=kind == "axisymmetric")
         plane = replace(plane, geometry=section)
         _check_radius(plane)

@@ -133,13 +133,22 @@ class NumberFile:
             if any(map(str.__contains__, rows, repeat("."))):
                 self._check_marks(at, rows, places)
             read = [row.replace(",", ".") for row in rows]
+        found = self._all_at_once(read, places)
+        if found is None and not any(map(str.__contains__, map(str.lower, read), repeat("nan"))):
+            s, text = self.separator, "".join(["\n", *read, "\n"])
+            for empty in (s + s, s + s, f"{s}\n", f"\n{s}"):  # twice, as neighbours share a separator
+                text = text.replace(empty, f"{empty[0]}nan{empty[1]}")
+            found = self._all_at_once(text.split("\n"), places, [place in optional for place in places])
+        return self._cell_by_cell(at, read, places, optional) if found is None else found
+
+    def _all_at_once(self, rows: list[str], places: Sequence[int], gaps: Sequence[bool] = (False,)) -> Array | None:
+        """None unless all cells are finite numbers, or NaN in the columns with gaps."""
         try:
-            found = np.loadtxt(read, delimiter=self.separator, usecols=places, ndmin=2, comments=None).T
-            if np.isfinite(found).all():
-                return np.ascontiguousarray(found)
+            found = np.loadtxt(rows, delimiter=self.separator, usecols=places, ndmin=2, comments=None).T
         except ValueError:
-            pass
-        return self._cell_by_cell(at, read, places, optional)
+            return None
+        read = np.isfinite(found) | (np.isnan(found) & np.array(gaps)[:, None])
+        return np.ascontiguousarray(found) if read.all() else None
 
     def _check_marks(self, at: Array, rows: list[str], places: Sequence[int]) -> None:
         """Raises InputError where one number has a decimal comma and another one a decimal point."""

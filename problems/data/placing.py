@@ -15,7 +15,11 @@ from gradient_routes.problems.problem import Array
 
 Outside = Literal["refuse", "drop", "snap"]
 OUTSIDE_TOLERANCE = 1e-3  # of the diameter: distance outside the mesh that is attributed to rounded coordinates
-FACTORS = {1e3: "in mm beside a mesh in m", 1e6: "in um beside a mesh in m", 1e-3: "in m beside a mesh in mm"}
+FACTORS = {
+    1e3: "in mm beside a mesh in m",
+    1e6: "in um beside a mesh in m",
+    1e-3: "in m beside a mesh in mm (mesh_unit=mm)",
+}
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.data.units import UNITS
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import BRICKS, MESHIO, Element, ElementName, Geometry
 from gradient_routes.problems.fem.facets import Facets
@@ -106,9 +107,9 @@ def box_mesh(who: str, element: ElementName, cells: tuple[int, int, int], size: 
     return make_mesh(who, element, mesh if element in BRICKS else mesh.to_meshtet())
 
 
-def read_mesh(who: str, path: str | Path, dim: int = 3) -> Mesh:
+def read_mesh(who: str, path: str | Path, unit: str = "m", dim: int = 3) -> Mesh:
     """The hexahedra or tetrahedra of a mesh file that meshio reads, with its named boundaries; dim = 2: the
-    quadrilaterals or triangles, in a plane z = constant.
+    quadrilaterals or triangles, in a plane z = constant. `unit` is the file's.
 
     Raises InputError for a file that cannot be read, without cells of one kind and this dimension, or inverted ones.
     """
@@ -137,6 +138,7 @@ def read_mesh(who: str, path: str | Path, dim: int = 3) -> Mesh:
         raise InputError(
             f"{who}: mesh={path} has points of {X.shape[1]} coordinates - it needs {', '.join(AXES[:dim])}"
         )
+    X = found.points = X * UNITS["length"][unit]
     if dim == 2 and X.shape[1] == 3 and np.ptp(X[cells], axis=(0, 1))[2] > PLANE_TOLERANCE * np.ptp(X[cells]):
         low, high = X[cells][..., 2].min(), X[cells][..., 2].max()
         raise InputError(f"{who}: mesh={path} is not plane: z from {low:g} to {high:g} - give one in the plane z = 0")

@@ -21,6 +21,7 @@ LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
 Kind = Literal["plane-stress", "plane-strain", "axisymmetric"]
 Count = Annotated[int, "cells along every edge"]
 Along = Annotated[int | None, "cells along this axis [n]"]
+MeshUnit = Annotated[Literal["m", "mm", "um"], "of the mesh file; all the rest is in SI"]
 Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom: rollers, planes of symmetry"]
 Law = Annotated[LawName, "stored energy"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
@@ -85,6 +86,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
     check_applies(
         who,
         ("mesh", meshed, False, counts | {"size": o.size != "1"}),
+        ("mesh", meshed, True, {"mesh_unit": o.mesh_unit != "m"}),
         ("mesh", meshed, False, {"element": element}),
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from commands import Ran
@@ -253,7 +254,9 @@ def test_points_in_a_hole_are_outside(file: File) -> None:
     assert np.abs(snapped).max() == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize(("unit", "says"), [(1e3, "in mm beside a mesh in m?"), (1e-3, "in m beside a mesh in mm?")])
+@pytest.mark.parametrize(
+    ("unit", "says"), [(1e3, "in mm beside a mesh in m?"), (1e-3, "in m beside a mesh in mm (mesh_unit=mm)?")]
+)
 def test_another_unit_than_the_mesh_is_named(unit: float, says: str, file: File) -> None:
     """Points all over a cube of 2 m, and one outside."""
     body = box_mesh("block", "hex8", (1, 1, 1), (2.0, 2.0, 2.0))
@@ -427,3 +430,20 @@ def test_bad_columns_and_units_end_with_one_line(options: str, cli: Callable[...
         2,
         "routes: --units: no --problem reads a file - write --problem 'NAME[data=FILE]'\n",
     )
+
+
+def test_a_mesh_in_mm_and_one_in_m_with_data_in_mm_are_one_problem(file: File, tmp_path: Path) -> None:
+    """The points lie at the same places; without its unit the mesh is told to be a thousand times too large."""
+    body = box_mesh("block", "hex8", (1, 1, 2), (1.0, 1.0, 1.0))
+    name, cells = body.geometry.for_meshio()
+    data = file("x [mm],y [mm],z [mm],ux (um),uz (um)\n100,200,900,3,4\n900,800,700,5,6\n")
+    found = []
+    for unit, scale in (("m", 1.0), ("mm", 1e3)):
+        path = tmp_path / f"{unit}.vtu"
+        meshio.Mesh(scale * body.geometry.X, [(name, cells)]).write(path)
+        found.append(Block(mesh=str(path), mesh_unit=unit, law="linear", unknown="constants", data=data))
+    one, other = found
+    np.testing.assert_allclose(one.data.probes.N, other.data.probes.N, atol=1e-13)
+    np.testing.assert_allclose(one.mesh.geometry.X, other.mesh.geometry.X, rtol=1e-15)
+    told = Block(mesh=str(tmp_path / "mm.vtu"), law="linear", unknown="constants", data=data).notes
+    assert "the points are in m beside a mesh in mm (mesh_unit=mm)?" in told
