@@ -10,6 +10,7 @@ import numpy as np
 from gradient_routes.problems.data.placing import Outside, place
 from gradient_routes.problems.data.repeats import without_repeats
 from gradient_routes.problems.data.table import Group, Table, read_table
+from gradient_routes.problems.data.units import doubt
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import BRICKS
 from gradient_routes.problems.fem.mesh import AXES, Mesh
@@ -102,20 +103,21 @@ def read_probes(
     axes = AXES[: mesh.geometry.dim]
     table = read_table(path, groups(axes), columns, units)
     x, d = table.stack(axes), table.stack([f"u{axis}" for axis in axes])
-    if np.isnan(d).all():
-        raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
     sigma = noise_of(table, axes, d, noise)
     kept, repeated = without_repeats(path, x, d, table.lines, sigma)
     placed = place(mesh, x[kept], path, outside)
     rows = np.flatnonzero(kept)[placed.rows]
     d, weights = d[rows], None
     measured = ~np.isnan(d)
+    if not measured.any():
+        raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
     if isinstance(sigma, np.ndarray):
         level = float(np.mean(sigma[rows][measured] ** -2.0) ** -0.5)
         weights = level / np.where(measured, sigma[rows], level)
         sigma = level
     probes = Probes(placed.nodes, placed.N, placed.x, measured, weights)
-    notes = tuple(filter(None, (table.said, repeated, *placed.said)))
+    doubtful = doubt(sigma, float(np.abs(d[measured]).max(initial=0.0)))
+    notes = tuple(filter(None, (table.said, repeated, *placed.said, doubtful)))
     return Measured(probes, np.where(measured, d, 0.0), sigma, notes)
 
 

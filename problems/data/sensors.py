@@ -12,6 +12,7 @@ import numpy as np
 
 from gradient_routes.problems.data.repeats import without_repeats
 from gradient_routes.problems.data.table import Group, Table, read_table
+from gradient_routes.problems.data.units import doubt
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
@@ -132,7 +133,7 @@ def read_sensors(
         raise InputError(f"{path}: data row {row} is of node {value:g}, {who} has nodes 1..{n} - correct the row")
     keep, repeated = without_repeats(path, node[:, None], d[:, None], table.lines, what="node")
     sigma = _level(table, noise, who)
-    notes = tuple(filter(None, (table.said, repeated)))
+    notes = tuple(filter(None, (table.said, repeated, doubt(sigma, float(np.abs(d).max())))))
     node, d = node[keep].astype(np.int64), d[keep]
     if nodes is None:
         return Measured(Sensors(node, d), sigma, notes)

@@ -61,6 +61,13 @@ def standard_deviation(noise: float | str | None, of_file: bool, who: str) -> fl
     return sigma
 
 
+def doubt(sigma: float, greatest: float) -> str:
+    """A note on noise that exceeds all data [m], else empty."""
+    if sigma <= greatest:
+        return ""
+    return f"noise of {sigma:.3g} m beside data up to {greatest:.3g} m: are the units right?"
+
+
 def quantity(value: float | str, kind: Kind, who: str) -> float:
     """A number, which is in SI, or text of a number and a unit, such as `0.4um` or `0.4 um`, in SI.
 

@@ -242,6 +242,11 @@ def test_points_outside_are_counted_and_refused_dropped_or_moved(box: Mesh, file
         np.testing.assert_allclose(found.read(box.geometry.X[found.nodes]), found.x, atol=1e-12)
 
 
+def test_what_is_left_inside_has_to_measure_something(box: Mesh, file: File) -> None:
+    with pytest.raises(InputError, match="measures nothing"):
+        probes(box, file(HEAD + "0.5,0.5,0.5,\n0.5,0.5,1.5,2\n"), "drop")
+
+
 def test_points_in_a_hole_are_outside(file: File) -> None:
     """Of 5 x 5 columns of cells the middle one is missing: its middle is 0.1 from the body."""
     full = box_mesh("block", "hex8", (5, 5, 1), (1.0, 1.0, 1.0))
@@ -323,6 +328,8 @@ def test_the_bar_reads_its_file_alike(file: File) -> None:
     seen = bar.observation(np.zeros(8), bar.parameters.start)
     assert seen.sigma == 4e-4
     assert Bar(data=file("node,displacement,sigma\n1,0.1,1e-3\n2,0.2,1e-3\n")).noise == 1e-3
+    doubtful = Bar(data=file("node,displacement\n1,0.1\n"), noise=0.4).read_as
+    assert doubtful == ("noise of 0.4 m beside data up to 0.1 m: are the units right?",)
 
 
 @pytest.mark.parametrize(
