@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gradient_routes.bench.units import duration
-from gradient_routes.problems.data.probes import COORDINATES, DISPLACEMENTS, read_probes
+from gradient_routes.problems.data.probes import groups, read_probes
 from gradient_routes.problems.data.table import read_table
 from gradient_routes.problems.fem.mesh import box_mesh
 
@@ -31,7 +31,7 @@ def main() -> None:
                 rows = 1e3 * np.random.default_rng(seed).uniform(size=(POINTS // 20, 6))
                 np.savetxt(file, rows, fmt="%.7g", delimiter=",")
         for what, read in (
-            ("read", lambda: read_table(path, (COORDINATES, DISPLACEMENTS))),
+            ("read", lambda: read_table(path, groups(3))),
             ("read and located", lambda: read_probes(mesh, str(path))),
         ):
             wall, cpu = time.perf_counter(), time.process_time()

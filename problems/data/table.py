@@ -17,6 +17,7 @@ from gradient_routes.problems.problem import Array
 
 SENTINEL = 99.0  # least size of a number that marks missing values
 APART = 10.0  # ratio of such a number to the greatest measured one
+NINES = (999.0, 9999.0, 99999.0, 999999.0)
 
 
 @dataclass(frozen=True)
@@ -183,22 +184,22 @@ def _check_missing(path: str | Path, columns: Sequence[Column]) -> None:
 
 
 def _check_sentinel(path: str | Path, column: Column, values: Array, lines: Array) -> None:
-    """Raises InputError for a number like -999 that marks missing values: whole, far from all others, and repeated or
-    of nines only.
+    """Raises InputError for numbers like -999 that mark missing values: whole and far from all others, which are of
+    nines or repeated; or of nines and repeated among numbers that are not whole.
     """
     size = np.abs(np.nan_to_num(values))
-    greatest = float(size.max())
-    at = np.flatnonzero(size == greatest)
-    nines = {*f"{greatest:.0f}"} == {"9"}
-    if greatest < SENTINEL or greatest != round(greatest) or not (nines or len(at) > 1):
-        return
-    others = size[size < greatest]
-    if others.size and greatest > APART * others.max() and (others.max() > 0.0 or nines):
-        raise InputError(
-            f"{path}: column {column.header} holds {values[at[0]]:g} in {len(at)} of {len(values)} rows, first in line"
-            f" {lines[at[0]]}, and nothing else beyond {others.max():.3g}: a mark of missing values? - leave such cells"
-            f" empty or remove the rows"
-        )
+    fractions = bool((size != np.round(size)).any())
+    for mark in (float(size.max()), *NINES):
+        at = np.flatnonzero(size == mark)
+        nines, others = mark in NINES, float(size[size < mark].max(initial=0.0))
+        repeated, whole = len(at) > 1, mark >= SENTINEL and mark == round(mark)
+        telling = (nines and len(size) > 1) or (repeated and others > 0.0)
+        far = telling and mark == size.max() > APART * others
+        if whole and at.size and (far or (nines and repeated and fractions)):
+            raise InputError(
+                f"{path}: column {column.header} holds {values[at[0]]:g} in {len(at)} of {len(values)} rows, first in"
+                f" line {lines[at[0]]}: a mark of missing values? - leave such cells empty or remove the rows"
+            )
 
 
 def _said(

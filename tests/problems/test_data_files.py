@@ -150,6 +150,7 @@ UNREADABLE: dict[str, tuple[str | bytes, str, dict[str, str]]] = {
     "a coordinate missing": (HEAD + "1,,3,4\n", "line 2, column y: '' is not a number", {}),
     "-999": (HEAD + "1,2,3,0.5\n1,2,4,-999\n1,2,5,-999\n", "column ux holds -999 in 2 of 3 rows, first in line 3", {}),
     "one -9999": (HEAD + "1,2,3,0.5\n1,2,4,-9999\n", "column ux holds -9999 in 1 of 2 rows", {}),
+    "-999 among numbers as large": (HEAD + "1,2,3,800.5\n1,2,4,-999\n1,2,5,1200.5\n1,2,6,-999\n", "-999 in 2 of 4", {}),
     "a sentinel of no name": (HEAD + "1,2,3,2\n1,2,4,-32768\n1,2,5,-32768\n", "a mark of missing values? - ", {}),
     "loads": ("x,y,z,ux,Load [kN]\n1,2,3,4,5\n", "column Load [kN]: load cases are not read from files yet", {}),
     "no such unit": (
