@@ -56,6 +56,8 @@ class Block(Solid):
         surface: Annotated[str, "face whose nodes move, for unknown=shape"] = "right",
         load: options.LoadKind = "traction",
         traction: Annotated[float, "on the loaded face, in z or along the normal [Pa]"] = 0.2,
+        force: options.Force = None,
+        direction: options.Direction = None,
         displacement: Annotated[float, "of the grip, in z [m]"] = 0.2,
         cases: Annotated[int, "load cases: in z, x, y (tractions across: 1/4); a follower's: 1, 1/2, 1/3"] = 1,
         sensors: Annotated[str | None, "face whose nodes are measured [loaded; right where a grip holds it]"] = None,

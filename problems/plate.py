@@ -70,6 +70,8 @@ class Plate(Solid):
         surface: Annotated[str, "edge whose nodes move, for unknown=shape"] = "right",
         load: options.LoadKind = "traction",
         traction: Annotated[float, "on the loaded edge, in y or along the normal [Pa]"] = 0.2,
+        force: options.Force = None,
+        direction: options.Direction = None,
         displacement: Annotated[float, "of the grip, in y [m]"] = 0.2,
         cases: Annotated[int, "load cases: in y, x (traction across: 1/4); a follower's: 1, 1/2"] = 1,
         sensors: Annotated[

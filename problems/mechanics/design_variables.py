@@ -218,11 +218,10 @@ def constants(mesh: Mesh, law: MaterialLaw, nu: float, E: float) -> DesignVariab
     return DesignVariables(parameters, lambda s, p, xp: replace(s, q=tuple(p)), 1.3 * start, q_p)
 
 
-def tractions(mesh: Mesh, facets: Facets, amplitude: float) -> DesignVariables:
-    """The traction vector of every loaded facet."""
+def tractions(mesh: Mesh, facets: Facets, t: Array) -> DesignVariables:
+    """The traction vector of every loaded facet, t (d,) at the start."""
     x = facets.centres
-    start, d = np.zeros_like(x), mesh.geometry.dim
-    start[:, -1] = amplitude
+    start, d, amplitude = np.broadcast_to(t, x.shape), mesh.geometry.dim, float(np.linalg.norm(t))
     bump = 1.0 + 0.5 * np.prod(np.sin(np.pi * mesh.normalized(x)[:, :-1]), axis=1)
     parameters = Parameters(
         start=start.ravel(),

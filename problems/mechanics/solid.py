@@ -31,6 +31,7 @@ from gradient_routes.problems.mechanics.design_variables import (
     DesignVariables,
     Setup,
 )
+from gradient_routes.problems.mechanics.load_direction import load_direction
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.problem import (
     Array,
@@ -80,7 +81,10 @@ class Solid(Problem):
         E, measured = o.modulus or 1.0, o.data not in (None, "twin")
         self.measured = measured
         self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
-        amplitude, unit = (o.displacement, "m") if gripped else (o.traction, "Pa")
+        if o.direction is not None:
+            directions = load_direction(o.direction, top, self.name)[None]
+        traction = o.traction if o.force is None else o.force / float(top.areas(mesh.geometry.X, np).sum())
+        amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
         q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
@@ -89,7 +93,7 @@ class Solid(Problem):
             "regions": lambda: design_variables.regions(mesh, law, o.nu, self.log, uniform, E),
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
             "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
-            "traction": lambda: design_variables.tractions(mesh, top, o.traction),
+            "traction": lambda: design_variables.tractions(mesh, top, traction * directions[0]),
             "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d(clamp, top.node_set)),
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
         }
@@ -112,6 +116,8 @@ class Solid(Problem):
         if measured:
             found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, self.noise)
             self.data = self._from_file(found)
+            self.read_as = (*found.notes, *self._load_in_words(o.loaded))
+            self.notes += self.read_as
             self.start_from_data = o.modulus is None and o.unknown in FITTED and not gripped
         elif o.markers:
             in_plane = o.components == "in-plane"
@@ -128,8 +134,6 @@ class Solid(Problem):
         greatest, size = float(np.abs(measured.d).max()), self.mesh.diameter
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        self.read_as = measured.notes
-        self.notes += self.read_as
         return DisplacementData(self.solid, measured.probes, measured.d[None], measured.sigma)
 
     def _without_file(self, points: probes.Probes) -> DisplacementData:
@@ -137,6 +141,16 @@ class Solid(Problem):
         height = TARGET * (points.x[:, -1] - self.mesh.bounding_box[0, -1])
         target = height[None, :, None] * self.solid.directions[:, None]
         return DisplacementData(self.solid, points, None if self.synthetic else target, self.noise)
+
+    def _load_in_words(self, face: str) -> tuple[str, ...]:
+        """What is applied, for a user who has measured it."""
+        solid = self.solid
+        if solid.load != "traction":
+            return ()
+        F = solid.dead_forces(solid.base, 0, np).sum(axis=(0, 1))
+        area = float(solid.loaded.areas(self.mesh.geometry.X, np).sum())
+        resultant = ", ".join(f"{f:.4g}" for f in F)
+        return (f"load: {solid.base.load:.4g} Pa on {face}, {area:.4g} m^2, in all ({resultant}) N",)
 
     def _with_motion(self, data: DisplacementData, kind: MotionName) -> DisplacementData:
         """With a motion to eliminate. Raises InputError for data that are all motion."""

@@ -32,6 +32,8 @@ Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every ro
 Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]
 OutsideOf = Annotated[Outside, "the file's points outside the body: an error, left out, or moved onto it"]
 MotionOf = Annotated[MotionName, "of the camera or the grips, unknown, in the data: eliminated from J"]
+Direction = Annotated[str | None, "of a dead load or a grip: x, -z, 0,0.6,0.8 or normal [the last axis]"]
+Force = Annotated[float | None, "total on the loaded face instead of traction= [N]"]
 Noise = Annotated[float | str | None, "standard deviation of a file's data, added to a twin's [m], or 0.4um"]
 Seed = Annotated[int, "of noise and markers"]
 Alpha = Annotated[float, "weight of Phi"]
@@ -91,6 +93,10 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, True, {"columns": o.columns, "units": o.units, "outside": o.outside != "refuse"}),
+        ("load=follower", o.load == "follower", False, {"direction": o.direction}),
+        ("cases", o.cases > 1, False, {"direction": o.direction}),
+        ("load=traction", o.load == "traction", True, {"force": o.force is not None}),
+        ("force", o.force is not None, False, {"traction": o.traction != 0.2}),
         ("data", o.data is not None, True, {"motion": o.motion != "none"}),
         ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
         ("unknown=layers", o.unknown == "layers", True, {"layers": o.layers}),
@@ -108,6 +114,8 @@ def _check_numbers(who: str, o: SimpleNamespace) -> None:
         raise InputError(f"{who}: nu={o.nu:g} - the laws are compressible, choose -1 < nu < 0.5")
     if o.modulus is not None and not 1e-30 <= o.modulus <= 1e30:
         raise InputError(f"{who}: modulus={o.modulus:g} Pa - choose one from 1e-30 to 1e30")
+    if o.force is not None and not math.isfinite(o.force):
+        raise InputError(f"{who}: force={o.force:g} - choose a finite one")
     if not (math.isfinite(o.traction) and math.isfinite(o.displacement)):
         raise InputError(f"{who}: traction={o.traction:g}, displacement={o.displacement:g} - choose finite ones")
     if standard_deviation(o.noise, o.data not in (None, "twin"), who) and o.data is None:
