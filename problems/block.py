@@ -60,7 +60,9 @@ class Block(Solid):
         direction: options.Direction = None,
         displacement: Annotated[float, "of the grip, in z [m]"] = 0.2,
         cases: Annotated[int, "load cases: in z, x, y (tractions across: 1/4); a follower's: 1, 1/2, 1/3"] = 1,
-        sensors: Annotated[str | None, "face whose nodes are measured [loaded; right where a grip holds it]"] = None,
+        sensors: Annotated[
+            str | None, "face whose nodes are measured, or everywhere [loaded; right with a grip]"
+        ] = None,
         markers: options.MarkerCount = 0,
         face: Annotated[str, "that carries the markers"] = "right",
         components: options.Components = "all",

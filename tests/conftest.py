@@ -40,7 +40,6 @@ from gradient_routes.bench.cli import main
 from gradient_routes.problems.advection import Advection
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
-from gradient_routes.problems.plate import Plate
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
@@ -92,10 +91,7 @@ def zoo() -> dict[str, Problem]:
     bars = {name: Bar(**options) for name, options in BARS.items()}
     advections = {name: Advection(**options) for name, options in ADVECTIONS.items()}
     follower = Block(nx=1, ny=1, nz=2, parametrization="raw", derivatives="hand", load="follower", cases=2)
-    ring = Plate(n=2, nx=1, kind="axisymmetric", radius=0.5, law="linear", element="tri3")
-    return (
-        bars | advections | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower, "plate": ring}
-    )
+    return bars | advections | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower}
 
 
 def options_of(route: Route, problem: Problem) -> list[dict[str, Any]]:

@@ -60,6 +60,8 @@ def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Pro
     """Random points on a face, uniform by area; `in_plane` leaves out the component closest to the normal."""
     facets, geometry = mesh.boundary(face), mesh.geometry
     area = facets.areas(geometry.X, np).sum(axis=1)
+    if not area.sum() > 0.0:
+        raise InputError(f"{mesh.who}: face={face} lies on the axis and has no area - choose another face")
     rng = np.random.default_rng(seed)
     chosen = rng.choice(len(area), size=count, p=area / area.sum())
     s = rng.uniform(size=(geometry.dim - 1, count))

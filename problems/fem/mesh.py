@@ -150,15 +150,15 @@ def read_mesh(who: str, path: str | Path, unit: str = "m", dim: int = 3) -> Mesh
     if element == "quad8":
         geometry = replace(mesh.geometry, nodes=cells, X=np.ascontiguousarray(X[:, :2]))
         mesh = replace(mesh, geometry=geometry)
-    _check_cells(mesh, path)
+    check_cells(mesh, f"mesh={path}", "correct the mesh")
     return mesh
 
 
-def _check_cells(mesh: Mesh, path: str | Path) -> None:
+def check_cells(mesh: Mesh, what: str, do: str) -> None:
     """Raises InputError for flat, inverted or overlapping cells; either orientation of the numbering is valid."""
     geometry, skfem_mesh = mesh.geometry, mesh.skfem_mesh
     if not np.isfinite(geometry.X).all():
-        raise InputError(f"{mesh.who}: mesh={path} has points that are not finite - correct the file")
+        raise InputError(f"{mesh.who}: {what} has points that are not finite - {do}")
     det = geometry.determinants()  # (n_e, n_a), at the nodes
     extent = np.ptp(geometry.X[geometry.nodes], axis=1).max(axis=1)[:, None]
     bad = (np.abs(det) <= 1e-12 * extent**geometry.dim).any(axis=1) | (np.sign(det) != np.sign(det[:, :1])).any(axis=1)
@@ -171,21 +171,20 @@ def _check_cells(mesh: Mesh, path: str | Path) -> None:
     bad[skfem_mesh.f2t[:, inner[sides[0] * sides[1] >= 0]]] = True
     if bad.any():
         raise InputError(
-            f"{mesh.who}: mesh={path}: {bad.sum()} of {len(bad)} cells are flat, inside out or folded over a neighbour,"
-            f" first cell {np.flatnonzero(bad)[0] + 1} - correct the mesh"
+            f"{mesh.who}: {what}: {bad.sum()} of {len(bad)} cells are flat, inside out or folded over a neighbour,"
+            f" first cell {np.flatnonzero(bad)[0] + 1} - {do}"
         )
 
 
 def make_mesh(who: str, element: ElementName, mesh: Any) -> Mesh:
     """From scikit-fem's mesh of the corners, or of all nodes of a tet10 or tri6."""
-    if element == "quad8":
+    from skfem import MeshTet2, MeshTri2
+
+    if element in ("quad8", "tri6") and not isinstance(mesh, MeshTri2):
         nodes = np.concatenate([mesh.t, mesh.nvertices + mesh.t2f])
         X = np.concatenate([mesh.p, mesh.p[:, mesh.facets].mean(axis=1)], axis=1)
         return Mesh(who, mesh, Geometry(Element(element), nodes.T, np.ascontiguousarray(X.T)))
     if element in ("tet10", "tri6"):
-        from skfem import MeshTet2, MeshTri2
-
-        kind = MeshTet2 if element == "tet10" else MeshTri2
-        quadratic = mesh if isinstance(mesh, kind) else kind.from_mesh(mesh).with_boundaries(mesh.boundaries or {})
+        quadratic = mesh if isinstance(mesh, MeshTet2 | MeshTri2) else MeshTet2.from_mesh(mesh)
         return Mesh(who, quadratic, Geometry(Element(element), quadratic.dofs.element_dofs.T, quadratic.doflocs.T))
     return Mesh(who, mesh, Geometry(Element(element), np.ascontiguousarray(mesh.t.T), np.ascontiguousarray(mesh.p.T)))

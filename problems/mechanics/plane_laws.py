@@ -87,7 +87,8 @@ def plane_stress(W: Energy, T: Array) -> Energy:
             return (state[2] > close) & (state[3] < AT_MOST)  # the last step but one was not small
 
         zero = jnp.zeros((), jnp.result_type(H, *q))
-        return jax.lax.while_loop(far, step, (zero, jnp.inf, jnp.inf, 0))[0]
+        h, size, *_ = jax.lax.while_loop(far, step, (zero, jnp.inf, jnp.inf, 0))
+        return jnp.where(size <= close, h, jnp.nan)  # no such h: the point can bear no plane stress
 
     @thinning.defjvp
     def _(primals: Any, tangents: Any) -> tuple[Any, Any]:
@@ -154,6 +155,7 @@ def _plane_stress_by_hand(material: NumpyMaterial, T: Array) -> NumpyMaterial:
                     h -= P / A
                     break
                 h[...], size = newton_step(h, P, A, np)
+            h[~(size <= close)] = np.nan  # no such h: the point can bear no plane stress
         return H_3D
 
     def moduli(A: Array) -> Array:

@@ -78,12 +78,15 @@ class Solid(Problem):
         if not moved.size:
             raise InputError(f"{self.name}: loaded={o.loaded}: all its nodes are clamped - choose another face")
         gripped = o.load == "displacement"
+        area = float(top.areas(mesh.geometry.X, np).sum())
+        if not gripped and not area > 0.0:
+            raise InputError(f"{self.name}: loaded={o.loaded} lies on the axis and has no area - choose another face")
         E, measured = o.modulus or 1.0, o.data not in (None, "twin")
         self.measured = measured
         self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
         if o.direction is not None:
             directions = load_direction(o.direction, top, self.name)[None]
-        traction = o.traction if o.force is None else o.force / float(top.areas(mesh.geometry.X, np).sum())
+        traction = o.traction if o.force is None else o.force / area
         amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
         q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)

@@ -68,15 +68,15 @@ class MultigridFactorization(Factorization):
 
 
 def _blocked(A: Any, near_nullspace: Array | None) -> Any:
-    """A in blocks of 3 x 3, the unknowns of a node, where the near-kernel begins with the three translations."""
+    """A in blocks of the unknowns of a node, where the near-kernel begins with translations along 3 axes, or 2."""
     from scipy.sparse import csr_matrix
 
     n = A.shape[0]
     A = csr_matrix((A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32)), shape=A.shape)
-    by_nodes = (
-        near_nullspace is not None and n % 3 == 0 and (near_nullspace[:, :3] == np.tile(np.eye(3), (n // 3, 1))).all()
-    )
-    return A.tobsr((3, 3)) if by_nodes else A
+    d = 0 if near_nullspace is None else {6: 3, 3: 2}.get(near_nullspace.shape[1], 0)  # by rigid-body modes
+    if near_nullspace is None or not d or n % d or (near_nullspace[:, :d] != np.tile(np.eye(d), (n // d, 1))).any():
+        return A
+    return A.tobsr((d, d))
 
 
 def start(rtol: float) -> Factorize:
