@@ -45,6 +45,9 @@ class BoundaryConditions:
         cases = np.repeat(index[None], len(directions), axis=0)
         for case, direction in zip(cases, directions, strict=True):
             case[gripped[:, None], np.flatnonzero(direction)] = n_free + 1
+            case[held] = n_free
+            if gripped.size and not (case > n_free).any():
+                raise InputError(f"{mesh.who}: the grip moves nothing: what it would move is held - free it")
         return cls(n_free, cases, held, gripped)
 
     @property

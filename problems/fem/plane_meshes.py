@@ -33,10 +33,10 @@ def hole_mesh(
 ) -> Mesh:
     """A rectangle from (0, 0) with the hole of this radius [m] in its middle; its boundary is named `hole`.
 
-    Raises InputError where cells are too coarse for the hole.
-
     cells (even) along the edges, `layers` of them from the hole outwards, in geometric progression. quarter: the hole
     is about (0, 0), and the rectangle, with half the cells along its edges, a quarter of a plate.
+
+    Raises InputError where the cells are too coarse for the hole.
     """
     from skfem import MeshQuad
 

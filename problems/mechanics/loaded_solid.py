@@ -157,21 +157,25 @@ class LoadedSolid:
         if self.load != "displacement":
             return u
         a = self.setup(p).load
-        for case, direction in enumerate(self.directions):
-            moved = self._ramp[:, None] * direction * a
+        for case, (direction, ramp) in enumerate(zip(self.directions, self._ramps, strict=True)):
+            moved = ramp[:, None] * direction * a
             index = self.bc.index[case]
             free = index < self.bc.n_free
             u[case * self.bc.n_free + index[free]] = moved[free]
         return u
 
     @cached_property
-    def _ramp(self) -> Array:
-        """(n_nodes,), from 0 at the clamp to 1 at the grip."""
+    def _ramps(self) -> list[Array]:
+        """For each load case (n_nodes,), from 0 where its direction is held to 1 at the grip."""
         from scipy.spatial import cKDTree
 
-        X = self.mesh.geometry.X
-        to_clamp, to_grip = (cKDTree(X[nodes]).query(X)[0] for nodes in (self.bc.clamped, self.bc.gripped))
-        return np.asarray(to_clamp / (to_clamp + to_grip))
+        X, ramps = self.mesh.geometry.X, []
+        to_grip = cKDTree(X[self.bc.gripped]).query(X)[0]
+        for direction in self.directions:
+            held = X[self.bc.held[:, direction != 0.0].any(axis=1)]
+            to_held = cKDTree(held).query(X)[0] if len(held) else np.ones(len(X))
+            ramps.append(np.asarray(to_held / np.maximum(to_held + to_grip, 1e-300)))
+        return ramps
 
     def residual(self, u: Array, p: Array) -> Array:
         self.check(p)

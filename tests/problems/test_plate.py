@@ -347,6 +347,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"clamped": "z=0"}, "no boundary 'z=0'"),
     ({"clamped": "none"}, "free to move"),
     ({"clamped": "none", "fixed": "x@left"}, "free to move"),
+    ({"load": "displacement", "fixed": "y@top"}, "the grip moves nothing"),
     ({"fixed": "z@left"}, "'z@left' is not a component x, y at a face"),
     ({"fixed": "left"}, "write x@left,y@bottom"),
     ({"derivatives": "hand", "law": "linear"}, "not linear"),
