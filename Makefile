@@ -11,7 +11,7 @@ CHECKED := adjoint faulty-adjoint
 TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-pythons lint type gate baseline adapters benchmark benchmark-regression benchmark-baseline faults mutants reports reference docs vega clean
+.PHONY: help demo measured test test-pythons lint type gate baseline adapters benchmark benchmark-regression benchmark-baseline faults mutants reports reference docs vega clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -26,6 +26,12 @@ $(READY): pyproject.toml constraints.txt
 
 demo: $(READY) ## install into .venv, then all seven routes on the bar
 	$(BIN)/routes run --problem bar --route all
+
+STEEL = plate[body=hole,nx=16,ny=4,size=0.08,0.02,radius=0.004,element=quad8,law=linear,unknown=constants,clamped=left,loaded=right,direction=normal,traction=106.2629e6,data=examples/measured/steel_plate.csv,noise=0.4um
+
+measured: $(READY) ## a published measurement to E and nu: flagged without the motion of the specimen, then with it
+	-$(BIN)/routes invert --problem '$(STEEL)]' --optimizer gauss-newton --no-plot
+	$(BIN)/routes invert --problem '$(STEEL),motion=rigid]' --optimizer gauss-newton --no-plot
 
 test: $(READY) ## install into .venv, then the tests
 	$(BIN)/python -m pytest -n 2 --dist worksteal

@@ -23,6 +23,7 @@ MANY = 50  # parameters, each of which takes a linearized solve
 NORMAL = 1.4826  # standard deviation of normal numbers, in medians of their sizes
 FAR = 5.0  # standard deviations beyond which a residual is an outlier
 EXCESS = 2.0  # times the noise, above which it does not explain the residuals
+STEP = 1e-30  # of complex steps
 EXCEEDS = "misfit exceeds noise"
 
 
@@ -43,9 +44,8 @@ class Residuals:
     def of(cls, seen: Observation) -> Residuals:
         r = np.abs(seen.predicted - seen.data) / seen.weight
         sigma = seen.sigma / seen.weight
-        level = max(NORMAL * float(np.median(r)), sigma)
-        inner = r[r <= FAR * level]
-        freedom = max(1, len(inner) - seen.eliminated)
+        inner = r[inliers(r, sigma)]
+        freedom = max(1, len(inner) - (0 if seen.modes is None else seen.modes.shape[1]))
         return cls(len(r), rms(r, len(r)), rms(inner, freedom), len(r) - len(inner), sigma)
 
     @property
@@ -70,12 +70,28 @@ class Residuals:
 @dataclass(frozen=True)
 class Fit:
     """Residuals; error bars sd (n_p,), nan where the data leave a parameter unbounded; constants as people state them,
-    by name, each with its own.
+    by name, each with its own error bar, and what each third of the data along their longest extent says alone.
+
+    Thirds differ by what the model leaves out, which error bars do not know.
     """
 
     residuals: Residuals
     sd: Array
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    thirds: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def described(self) -> str:
+        lines = []
+        for name, (value, sd) in self.stated.items():
+            apart = ", ".join(f"{third:.4g}" for third in self.thirds.get(name, ()))
+            lines.append(f"{name} {value:.4g} +- {sd:.2g}" + (f"; thirds of the data alone: {apart}" if apart else ""))
+        return "\n".join([*lines, self.residuals.described])
+
+
+def inliers(r: Array, sigma: float) -> Array:
+    """Which residuals of sizes r are no outliers."""
+    return np.asarray(r <= FAR * max(NORMAL * float(np.median(r)), sigma))
 
 
 def rms(r: Array, freedom: int) -> float:
@@ -98,7 +114,9 @@ def fit(problem: Problem, p: Array, solver: Solver) -> Fit | None:
     residuals = Residuals.of(seen)
     sigma = seen.sigma or residuals.inner_rms * seen.weight
     sd = posterior.known(problem, p, H, scale, sigma).sd
-    return Fit(residuals, sd, {} if H is None else _stated(problem, p, H, scale, sigma))
+    if H is None:
+        return Fit(residuals, sd)
+    return Fit(residuals, sd, _stated(problem, p, H, scale, sigma), _thirds(problem, p, H, scale, seen))
 
 
 def _stated(problem: Problem, p: Array, H: Array, scale: Array, sigma: float) -> dict[str, tuple[float, float]]:
@@ -106,10 +124,32 @@ def _stated(problem: Problem, p: Array, H: Array, scale: Array, sigma: float) ->
     values = problem.stated(p)
     if not values:
         return {}
-    step = 1e-30
-    by_x = np.array([[v.imag / step for v in problem.stated(p + 1j * step * e).values()] for e in np.diag(scale)]).T
+    by_x = np.array([[v.imag / STEP for v in problem.stated(p + 1j * STEP * e).values()] for e in np.diag(scale)]).T
     R = np.asarray(np.linalg.qr(H, mode="r"))
     if np.linalg.cond(R) > 1.0 / posterior.EPS:
         return {name: (float(value.real), np.nan) for name, value in values.items()}
     sd = sigma * np.linalg.norm(np.linalg.solve(R.T, by_x.T), axis=0)
     return {name: (float(value.real), float(s)) for (name, value), s in zip(values.items(), sd, strict=True)}
+
+
+def _thirds(problem: Problem, p: Array, H: Array, scale: Array, seen: Observation) -> dict[str, tuple[float, ...]]:
+    """One Gauss-Newton step from the answer for each third, with a motion of its own where that is unknown, without
+    outliers.
+    """
+    x = seen.position
+    if x is None or not problem.stated(p) or len(x) < 6 * len(p):
+        return {}
+    along = x[:, int(np.ptp(x, axis=0).argmax())]
+    third = np.digitize(along, np.linspace(along.min(), along.max(), 4)[1:-1])
+    r, found = seen.predicted - seen.data, []
+    kept = inliers(np.abs(r), seen.sigma)
+    for k in range(3):
+        rows = (third == k) & kept
+        A, b = H[rows], -r[rows]
+        if seen.modes is not None:
+            Q, _ = np.linalg.qr(seen.modes[rows])
+            A, b = A - Q @ (Q.T @ A), b - Q @ (Q.T @ b)
+        if len(b) <= len(p) or np.linalg.matrix_rank(A) < len(p):
+            return {}
+        found.append(problem.stated(p + scale * np.linalg.lstsq(A, b, rcond=None)[0]))
+    return {name: tuple(float(of[name]) for of in found) for name in found[0]}

@@ -91,7 +91,8 @@ class DisplacementData:
         predicted = np.concatenate([self.probes.read(U[case])[measured] for case in cases])
         data = np.concatenate([d[case][measured] for case in cases])
         S_p = S_a if self.solid.grip_is_parameter else None
-        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label)
+        at = np.tile(self.probes.x[np.nonzero(measured)[0]], (len(d), 1))
+        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=at)
         if self.probes.weights is not None:
             seen = seen.weighted(np.tile(self.probes.weights[measured], len(d)))
         return seen if self.motion is None else seen.without(self.motion, len(d))

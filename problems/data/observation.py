@@ -24,7 +24,8 @@ class Observation:
     label              (k) -> name of datum k
     weight             factor contained in predicted, data, S_u and sigma
     relative           weights of the data, relative to their mean accuracy, contained in them as well
-    sampling (m, n_u)  S, sparse, where S_u is what is left of it; eliminated: how many unknowns took the rest
+    sampling (m, n_u)  S, sparse, where S_u is what is left of it after `modes` (m, k) were eliminated
+    position (m, d)    of each datum [m], or None
     """
 
     predicted: Array
@@ -36,7 +37,8 @@ class Observation:
     weight: float = 1.0
     relative: Array | float = 1.0
     sampling: Any = None
-    eliminated: int = 0
+    modes: Array | None = None
+    position: Array | None = None
 
     def weighted(self, w: Array) -> Observation:
         """With factors w (m,), by which J weights the data; those of equal accuracy have one sigma then."""
@@ -75,7 +77,7 @@ class Observation:
             S_u=LinearOperator(S.shape, matvec=stacked, rmatvec=spread, matmat=stacked, rmatmat=spread, dtype=float),
             S_p=None if self.S_p is None else np.stack([projected(column) for column in self.S_p.T], axis=1),
             sampling=self.S_u,
-            eliminated=cases * motion.Q.shape[1],
+            modes=np.kron(np.eye(cases), motion.Q),
         )
 
 

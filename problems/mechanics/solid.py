@@ -152,7 +152,7 @@ class Solid(Problem):
             return ()
         F = solid.dead_forces(solid.base, 0, np).sum(axis=(0, 1))
         area = float(solid.loaded.areas(self.mesh.geometry.X, np).sum())
-        resultant = ", ".join(f"{f:.4g}" for f in F)
+        resultant = ", ".join(f"{f:.4g}" for f in np.where(np.abs(F) > 1e-12 * np.abs(F).max(), F, 0.0))
         return (f"load: {solid.base.load:.4g} Pa on {face}, {area:.4g} m^2, in all ({resultant}) N",)
 
     def _with_motion(self, data: DisplacementData, kind: MotionName) -> DisplacementData:

@@ -74,9 +74,8 @@ def _estimates(out: Console, found: Inversion) -> None:
     out.print()
     tables.show(out, estimates(found))
     if found.fit is not None:
-        stated = ", ".join(f"{name} {value:.4g} +- {sd:.2g}" for name, (value, sd) in found.fit.stated.items())
-        says = Text("\n".join(filter(None, (stated, found.fit.residuals.described))))
-        out.print(says, style="yellow" if found.unexplained else "", soft_wrap=not out.is_terminal)
+        style = "yellow" if found.unexplained else ""
+        out.print(Text(found.fit.described), style=style, soft_wrap=not out.is_terminal)
     if found.view.eliminated:
         moved = ", ".join(f"{name} {value:.4g}" for name, value in found.view.eliminated.items())
         out.print(Text(f"eliminated from J: {moved}"), soft_wrap=not out.is_terminal)

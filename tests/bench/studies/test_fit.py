@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -67,9 +69,9 @@ def test_E_and_nu_are_stated_with_error_bars_and_a_misfit_is_flagged(cli, tmp_pa
         assert ran.code == (1 if wrong else 0), ran.out + ran.err
         assert ("misfit exceeds noise" in ran.out) == bool(wrong)
         if not wrong:
-            (line,) = [line for line in ran.out.splitlines() if line.startswith("E [Pa]")]
-            got = [float(word.strip(",")) for word in line.replace("+-", "").split() if word[0].isdigit()]
-            (E_found, sd_E, nu_found, sd_nu) = got
+            number = r"([-\d.e+]+)"
+            said = [re.search(rf"^{name} {number} \+- {number}", ran.out, re.M) for name in (r"E \[Pa\]", "nu")]
+            (E_found, sd_E), (nu_found, sd_nu) = (map(float, found.groups()) for found in said)
             assert abs(E_found - E) < 4 * sd_E
             assert abs(nu_found - nu) < 4 * sd_nu
             assert 0.0 < sd_E < 1e-2
