@@ -11,6 +11,7 @@ from gradient_routes.problems.errors import InputError
 
 UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "KIB": 2**10, "MIB": 2**20, "GIB": 2**30}
 POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+KERNELS = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")  # set for a machine, not for a case; peers are rid of them, too
 LEAST = 64 * 2**20  # [byte] less than an interpreter with NumPy takes
 
 

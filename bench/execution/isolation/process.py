@@ -16,7 +16,7 @@ import psutil
 
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation import descendants
-from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.limits import KERNELS, Limits
 from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.execution.isolation.stack import ASKED, without
 from gradient_routes.bench.sanitize import pass_on
@@ -64,9 +64,10 @@ class Confined:
         self._mark = descendants.new_mark()
         self._killing, self._killed = threading.RLock(), False
         self._talkative, self._stderr, self._last_words = talkative, bytearray(), last_words
+        ours = {name: value for name, value in os.environ.items() if name not in KERNELS}
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", module, *arguments],
-            env={**os.environ, **limits.environment, descendants.MARK: self._mark},
+            env={**ours, **limits.environment, descendants.MARK: self._mark},
             stderr=subprocess.PIPE,
             start_new_session=True,
             **popen,

@@ -187,6 +187,16 @@ def test_a_refusal_of_others_comes_through(cli, tmp_path: Path, selector: str) -
     assert (ran.code, ran.out, ran.err) == (2, "", "routes: refusing: n=3 is odd - choose an even n\n")
 
 
+def test_kernels_forced_on_the_machine_are_not_those_of_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    process = watching.Confined("timeit", ["-n", "1", "input()"], Limits(), stdin=subprocess.PIPE)
+    variables = Path(f"/proc/{process.process.pid}/environ").read_text()
+    process.kill()
+    process.process.stdin.close()
+    assert "OPENBLAS_CORETYPE" not in variables
+    assert "OPENBLAS_NUM_THREADS=1" in variables
+
+
 def test_a_process_is_killed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its number may be another's afterwards."""
     process = watching.Confined("timeit", ["-n", "1", "pass"], Limits(), stdout=subprocess.DEVNULL)
