@@ -47,7 +47,7 @@ class SolverOptions(TypedDict, total=False):
     rtol           |R| relative to its start, 0 < rtol < 1 [1e-12]
     max_steps      Newton steps at most [50]
     linear_solver  "auto", "pardiso", "superlu", "cg-amg", "krylov" or "descent" ["auto"]
-    newton         "full", or "inexact": factors are kept and iterated with ["full"]
+    newton         "full", "inexact": factors are kept and iterated with, or what costs less ["auto"]
     """
 
     rtol: float

@@ -24,9 +24,9 @@ FINISHED = "what is finished is printed, and kept unless --no-store"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (in quotes: [ and | are special to shells) or all. May be repeated."
 AT = "Point p of the gradient; a file has a header line and n_p values in one column."
 LINEAR_SOLVERS = [*points()]
-NEWTONS = ["full", "inexact"]
+NEWTONS = ["auto", "full", "inexact"]
 ITERATIVE = "Linear solver; krylov and descent are iterative, for any matrix, and stop at --rtol."
-NEWTON = "Factorize at every Newton step, or keep the factors and iterate with them."
+NEWTON = "Factorize at every Newton step, or keep the factors and iterate with them; auto: what costs less."
 
 store_option = click.option(
     "--store", type=click.Path(path_type=Path), default=STORE, show_default=True, help="SQLite file of results."
@@ -47,7 +47,7 @@ max_steps_option = click.option(
 linear_solver_option = click.option(
     "--linear-solver", type=click.Choice(LINEAR_SOLVERS), default=DEFAULT, show_default=True, help=ITERATIVE
 )
-newton_option = click.option("--newton", type=click.Choice(NEWTONS), default="full", show_default=True, help=NEWTON)
+newton_option = click.option("--newton", type=click.Choice(NEWTONS), default="auto", show_default=True, help=NEWTON)
 
 
 Command = Callable[..., Any]
@@ -70,7 +70,7 @@ def solver_options(command: Command) -> Command:
     return rtol_option(max_steps_option(linear_solver_option(newton_option(with_solver))))
 
 
-def solver_of(rtol: float = 1e-12, max_steps: int = 50, linear_solver: str = "auto", newton: Newton = "full") -> Solver:
+def solver_of(rtol: float = 1e-12, max_steps: int = 50, linear_solver: str = "auto", newton: Newton = "auto") -> Solver:
     """The forward solve that these options ask for. Raises InputError."""
     from gradient_routes.routes.newton import Solver
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.newton import Newton, Solver
 from gradient_routes.routes.tally import Work
 
 
@@ -18,7 +18,8 @@ class ForwardWork:
     rtol         of the solver
     counted      of a whole gradient, once known: the numbers of Newton steps and refinements are taken from it
     matrix_free  products with R_u need no assembly
-    inexact      Newton steps, see Solver.newton: k of them with m products take k + m substitutions
+    newton       the steps, see Solver.newton: k that are not full take k + m substitutions with m products. Those of
+                 auto are full but for cold solves
     """
 
     cold: Work
@@ -26,7 +27,7 @@ class ForwardWork:
     rtol: float = Solver.rtol
     counted: Work | None = None
     matrix_free: bool = False
-    inexact: bool = False
+    newton: Newton = "full"
 
     def polished(self) -> Work:
         """A cold solve and one step more."""
@@ -34,7 +35,7 @@ class ForwardWork:
 
     def full(self, times: int, polish: int) -> Work:
         """`times` cold solves near p by full steps, which complex p takes whatever the solver says."""
-        if not self.inexact:
+        if self.newton == "full":
             return self.solves(times, polish)
         steps = times * (self.cold.newton_iterations + polish)
         steps = steps if self.counted is None else self.counted.newton_iterations
@@ -42,7 +43,7 @@ class ForwardWork:
 
     def solves(self, times: int, polish: int = 0) -> Work:
         """`times` cold solves near p, each with `polish` steps more: see Model.solve."""
-        if self.inexact:
+        if self.newton != "full":
             return self._iterated(times, cold=times) or times * self.cold
         extra = 0 if self.linear else times * polish
         if self.counted is not None and not self.linear:
@@ -63,14 +64,16 @@ class ForwardWork:
 
     def warm(self, times: int, h: float) -> Work:
         """A polished solve and `times` from its state, where |R| ~ h: a step squares that (linear: one is enough)."""
-        if self.inexact and (iterated := self._iterated(1 + times, cold=1)):
+        if self.newton == "inexact" and (iterated := self._iterated(1 + times, cold=1)):
             return iterated
         each = 1 if self.linear else max(1, math.ceil(math.log2(self._decades(h))))
         return self.polished() + Work(forward_solves=times, residuals=times) + self._newton(self._near(times * each))
 
     def chord(self, times: int, h: float) -> Work:
         """The same on the factors of the first: every step multiplies |R| by about h."""
-        if self.inexact and (iterated := self._iterated(1 + times, cold=1, directions=self.cold.newton_iterations + 1)):
+        if self.newton == "inexact" and (
+            iterated := self._iterated(1 + times, cold=1, directions=self.cold.newton_iterations + 1)
+        ):
             return iterated
         steps = self._near(times * max(1, math.ceil(self._decades(h)) - 1))
         return self.polished() + Work(times, newton_iterations=steps, residuals=times + steps, solves=steps)

@@ -12,8 +12,18 @@ import numpy as np
 from gradient_routes.problems.errors import NotConverged, SingularMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
 from gradient_routes.routes.load_stepping import by_load_steps
-from gradient_routes.routes.newton import Solver, State, System, newton, norm, rounding, unwatched
-from gradient_routes.routes.newton_steps import Chord, Direction, Full, Inexact, Operations, Recorded, Step
+from gradient_routes.routes.newton import Newton, Solver, State, System, newton, norm, rounding, unwatched
+from gradient_routes.routes.newton_steps import (
+    Auto,
+    Chord,
+    Direction,
+    Full,
+    Inexact,
+    Operations,
+    Recorded,
+    Step,
+    Truncated,
+)
 from gradient_routes.routes.precision import double, double_operator
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
@@ -163,10 +173,9 @@ class Model:
         return steps.steps, history[-1] / (history[0] or 1.0)
 
     @property
-    def inexact(self) -> bool:
-        """Whether real states are solved for by inexact steps."""
-        problem = self.problem
-        return self.solver.newton == "inexact" and not problem.linear and problem.line_search
+    def newton(self) -> Newton:
+        """The steps by which real states are solved for."""
+        return "full" if self.problem.linear or not self.problem.line_search else self.solver.newton
 
     def _operations(self, p: Array) -> Operations:
         problem = self.problem
@@ -184,9 +193,13 @@ class Model:
         operations = self._operations(p)
         if factors is not None:
             return Chord(operations, factors)
-        if self.inexact and not np.iscomplexobj(p):
-            return Inexact(operations, None if start is None else start.factors)
-        return Full(operations)
+        if np.iscomplexobj(p) or self.newton == "full" or (self.newton == "auto" and start is not None):
+            return Full(operations)
+        if self.solver.linear.iterates:
+            return Truncated(operations)
+        if self.newton == "auto":
+            return Auto(operations, self.solver.adjoint_rtol)
+        return Inexact(operations, None if start is None else start.factors)
 
     @property
     def _who(self) -> str:

@@ -23,7 +23,7 @@ RESOLVED = 1e-6  # of |u|: where rounding of X + u is more, u is not resolved
 CANCELLED = 1e4  # |u| / |u - du| beyond which u - du has lost digits, which |R| may not show
 LAST = 8  # iterates in a message
 
-Newton = Literal["full", "inexact"]
+Newton = Literal["auto", "full", "inexact"]
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,11 @@ class Solver:
 
     linear_solver  the name of a registered LinearSolver; auto: the best direct one that is installed
     newton         full: R_u is factorized at every step; inexact: once, and again where that is cheaper than
-                   iterating. Full steps are taken on linear problems, for complex p, whose imaginary part no tolerance
-                   controls, and on problems without line search, where convergence is proved for full steps
+                   iterating; auto: where a solve and an adjoint after it are cheaper so, iterations as far as one
+                   factorization more ends the solve, by full steps from a state nearby. Solvers that iterate end
+                   inexact steps and those of auto early. Full steps are taken on linear problems, for complex p, whose
+                   imaginary part no tolerance controls, and on problems without line search, where convergence is
+                   proved for full steps
     adjoint_rtol   |b - R_u x|_inf / |b|_inf of linearized solves, transposed or not, where they iterate
     polish         Newton steps after convergence, on nonlinear problems
     """
@@ -41,7 +44,7 @@ class Solver:
     rtol: float = 1e-12
     max_steps: int = 50
     linear_solver: str = DEFAULT
-    newton: Newton = "full"
+    newton: Newton = "auto"
     adjoint_rtol: float = 1e-12
     polish: int = 0
 

@@ -1,4 +1,5 @@
-"""Newton steps: exact, R_u du = R; chord steps, A du = R with given factors of A; inexact, by Krylov iterations.
+"""Newton steps: exact, R_u du = R; chord steps, A du = R with given factors of A; inexact, by Krylov iterations; auto,
+inexact until an exact one ends the solve.
 
 Inexact steps keep one factorization as preconditioner (Dembo, Eisenstat & Steihaug 1982). On the block with 16^3 cells
 a factorization with its assembly costs as much as 16 products, each with a substitution (10 ms together).
@@ -20,6 +21,8 @@ from gradient_routes.routes.solvers.solver import Factorization
 WORTH = 20.0  # products that cost as much as new factors and the few products that follow them
 LOOSEST = 0.05  # forcing term |R - R_u du| / |R|
 BELOW = 0.3  # of the goal: the aim of the last step
+PER_ROW = 350.0  # bytes of factors in a row of R_u for which new ones cost as much as a product and a substitution
+UNSURE = 10.0  # by which the remainder of an exact step may exceed what that of the first foretells
 
 
 @dataclass(frozen=True)
@@ -143,23 +146,32 @@ class Inexact:
             return self._exact(self._do.assemble(u), R)
         if self.rate is None:  # after an exact step, the ratio of residuals estimates the contraction by its factors
             self.rate = size / before
-        if self.rate < 1.0 and products_to(self.rate, size, goal) > WORTH:
+        worth, goal = self._worth(), self._aim(size, scale, goal)
+        if self.rate < 1.0 and products_to(self.rate, size, goal) > worth:
             return self._exact(self._do.assemble(u), R)
         K = (self._do.operator or self._do.assemble)(u)
         iterate = conjugate_gradients if self._do.symmetric else conjugate_residuals
-        eta = min(LOOSEST, max(math.sqrt(size / scale) if scale else 0.0, BELOW * goal / size if size else 0.0))
+        eta = forcing(size, scale, goal)
         done = iterate(
             lambda v: self._do.product(K, v),
             self._substitute,
             R,
             eta * size,
             self.rate,
-            at_most=int(WORTH),
+            at_most=max(1, int(worth)),
         )
         if not done.converged:
             return self._exact(self._do.assemble(u) if self._do.operator else K, R)
         self.rate = done.rate
         return done.x, self.factors.norm
+
+    def _aim(self, size: float, scale: float, goal: float) -> float:
+        """The |R| that iterations have to reach; 0 where an exact step is due."""
+        return goal
+
+    def _worth(self) -> float:
+        """Products, each with a substitution, that cost as much as new factors."""
+        return WORTH
 
     def _substitute(self, b: Array) -> Array:
         assert self.factors is not None
@@ -173,3 +185,61 @@ class Inexact:
     def renew(self) -> bool:
         exact, self.factors = self.rate is None, None
         return not exact
+
+
+class Auto(Inexact):
+    """Inexact until one exact step reaches the goal, then that one, where new factors cost less than the products that
+    they save in the rest of the solve and in a linearized one to `rtol` after it.
+
+    An exact step leaves c |R|^2 / scale, c about as after the first. The last factors are those of the last iterate,
+    as after full steps. Factors of m entries in each row cost about m times as much as a substitution with them.
+    """
+
+    def __init__(self, operations: Operations, rtol: float) -> None:
+        super().__init__(operations)
+        self._rtol = rtol
+        self._c: float | None = None
+        self._n = 1
+
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
+        self._n = len(u)
+        return super().__call__(u, R, scale, goal)
+
+    def _aim(self, size: float, scale: float, goal: float) -> float:
+        assert self.rate is not None
+        if self._c is None:
+            self._c = size / scale
+        near = math.sqrt(goal * scale / (UNSURE * self._c))
+        saved = products_to(self.rate, size, goal) + products_to(self.rate, 1.0, self._rtol)
+        if self.rate < 1.0 and saved <= self._worth():
+            return goal
+        return near if size > near else 0.0
+
+    def _worth(self) -> float:
+        assert self.factors is not None
+        return self.factors.nbytes / (PER_ROW * self._n)
+
+
+class Truncated:
+    """|R - R_u du| <= eta |R|, eta as for Inexact, by a linear solver that iterates, R_u assembled at every u."""
+
+    rate: float | None = math.inf
+
+    def __init__(self, operations: Operations) -> None:
+        self._do = operations
+        self.factors: Factorization | None = None
+
+    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
+        self.factors = None
+        self.factors = self._do.factorize(self._do.assemble(u))
+        self._do.step()
+        eta = forcing(float(np.abs(R).max(initial=0.0)), scale, goal)
+        return self._do.substitute(self.factors.to(eta), R), self.factors.norm
+
+    def renew(self) -> bool:
+        return False
+
+
+def forcing(size: float, scale: float, goal: float) -> float:
+    """eta for |R| = size: sqrt(|R| / scale), at most LOOSEST and at least what the goal needs."""
+    return min(LOOSEST, max(math.sqrt(size / scale) if scale else 0.0, BELOW * goal / size if size else 0.0))

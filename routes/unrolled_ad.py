@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -112,7 +113,7 @@ def resolve(
     On nonlinear problems k is the larger number of the linear systems at the first and the last Newton step.
     """
     problem, inner = model.problem, chosen(model.problem, inner)
-    state = None if problem.linear else model.solve(p)
+    state = None if problem.linear else Model(problem, replace(model.solver, newton="full")).solve(p)
     steps = 1 if state is None else state.work.newton_iterations
     if inner != "direct" and not problem.linear:
         newton = newton or steps

@@ -68,7 +68,7 @@ class CaseContext:
         self.partial = self._restrict(settings.partial)
         self.p.flags.writeable = False  # shared by all routes
         # references are independent of the solver that is examined
-        direct = replace(settings.solver, linear_solver=Solver.linear_solver, newton=Solver.newton)
+        direct = replace(settings.solver, linear_solver=Solver.linear_solver, newton="full")
         self.judges = Judges(Model(self.problem, direct), self.p, self._unaffordable_reference, found)
         self._forward_model = self.model()
         self.factor_bytes: int | None = None  # behind the forward solve, once priced

@@ -52,7 +52,7 @@ def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
     forward, state = price_of(lambda: model.solve(p))
     R_u = model.tangent_operator(state)
     declared = ForwardWork(
-        state.work, problem.linear, model.solver.rtol, matrix_free=problem.matrix_free, inexact=model.inexact
+        state.work, problem.linear, model.solver.rtol, matrix_free=problem.matrix_free, newton=model.newton
     )
     solve, _ = price_of(lambda: state.factors.solve(state.u))
     matvec, _ = price_of(lambda: R_u @ state.u)

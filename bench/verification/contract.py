@@ -190,4 +190,4 @@ def _forward(problem: Problem, p: Array, solver: Solver, counted: Work) -> Forwa
         return ForwardWork(Work(forward_solves=1))
     state = model.solve(p)
     known = None if problem.linear else counted
-    return ForwardWork(state.work, problem.linear, solver.rtol, known, problem.matrix_free, model.inexact)
+    return ForwardWork(state.work, problem.linear, solver.rtol, known, problem.matrix_free, model.newton)

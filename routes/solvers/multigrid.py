@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ AT_MOST = 500  # products
 
 
 class MultigridFactorization(Factorization):
-    """Solves A x = b, A symmetric positive definite, to |b - A x|_inf <= 1e-13 |b|_inf or to rounding.
+    """Solves A x = b, A symmetric positive definite, to |b - A x|_inf <= rtol |b|_inf, 1e-13 unless told otherwise.
 
     The hierarchy (Vanek, Mandel & Brezina 1996; by pyamg) uses the near-kernel of the matrix pattern. A solve raises
     NotConverged where the iteration stalls, SingularMatrix where A turns out not to be positive definite.
@@ -32,7 +33,7 @@ class MultigridFactorization(Factorization):
         if not isinstance(A, SymmetricSparse) or np.iscomplexobj(A.data):
             kind = "complex" if isinstance(A, SymmetricSparse) else "not known to be symmetric"
             raise InputError(f"{who}: cg-amg solves real symmetric systems, R_u is {kind} - take pardiso or superlu")
-        self._who = who
+        self._who, self.rtol = who, RTOL
         bad = np.flatnonzero(~(A.diagonal > 0.0))
         if bad.size:
             raise SingularMatrix(self._indefinite(f"its diagonal has {A.diagonal[bad[0]]:.3g}"))
@@ -51,8 +52,14 @@ class MultigridFactorization(Factorization):
     def nbytes(self) -> int:
         return self._nbytes
 
+    def to(self, rtol: float) -> MultigridFactorization:
+        """The last correction relies on the mean contraction of those before it: a digit more is aimed at."""
+        other = copy(self)
+        other.rtol = max(RTOL, rtol / 10.0)
+        return other
+
     def substitute(self, b: Array, transposed: bool) -> Array:
-        wanted = RTOL * float(np.abs(b).max(initial=0.0))
+        wanted = self.rtol * float(np.abs(b).max(initial=0.0))
         done = conjugate_gradients(
             self._A.__matmul__, self._cycle.__matmul__, b, wanted, at_most=AT_MOST, definite=True, tried=AT_MOST
         )

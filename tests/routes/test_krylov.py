@@ -13,8 +13,9 @@ from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.finite_difference import fd_central
 from gradient_routes.routes.forward_work import ForwardWork
+from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.newton import Newton, Solver
 from gradient_routes.routes.route import Route
 from gradient_routes.routes.solvers.krylov import Iterated, conjugate_gradients, conjugate_residuals, products_to
 from gradient_routes.routes.tangent import tangent
@@ -145,6 +146,7 @@ def test_gradients_after_inexact_steps_are_those_after_full_ones(name: str, rout
 
 
 @pytest.mark.parametrize("name", NONLINEAR)
+@pytest.mark.parametrize("newton", ["auto", "inexact"])
 @pytest.mark.parametrize(
     ("route", "options"),
     [
@@ -157,14 +159,41 @@ def test_gradients_after_inexact_steps_are_those_after_full_ones(name: str, rout
         (fd_central, {"step": None, "start": "chord"}),
     ],
 )
-def test_counted_work_is_the_declared_work_of_inexact_steps(name: str, route: Route, options: dict) -> None:
+def test_counted_work_is_the_declared_work(name: str, route: Route, options: dict, newton: Newton) -> None:
     problem = CASES[name]
-    p, model = problem.parameters.start, Model(problem, Solver(newton="inexact"))
-    cold = Model(problem, Solver(newton="inexact")).solve(p).work
+    p, model = problem.parameters.start, Model(problem, Solver(newton=newton))
+    cold = Model(problem, Solver(newton=newton)).solve(p).work
     route.prepare(model, p, **options)(p)
     counted = model.tally.work
-    forward = ForwardWork(cold, False, 1e-12, counted, problem.matrix_free, inexact=True)
+    forward = ForwardWork(cold, False, 1e-12, counted, problem.matrix_free, newton=newton)
     assert route.cost(len(p), forward, **options) == counted
+
+
+def test_auto_ends_a_solve_as_full_steps_do_on_fewer_factors() -> None:
+    """Its last factors are so near the solution that an adjoint solve takes two products at most."""
+    block = Block(n=5)
+    p = block.parameters.start
+    full, auto = (Model(block, Solver(newton=newton)) for newton in ("full", "auto"))
+    state = auto.solve(p)
+    assert 2 == state.work.factorizations < full.solve(p).work.factorizations
+    assert state.rate is None
+    assert state.residual < 1e-12
+    before = auto.tally.work
+    LinearizedSolver(auto, state, "refined").solve_transposed(-auto.linearize(state).J_u)
+    work = auto.tally.work - before
+    assert (work.factorizations, work.matvecs <= 2) == (0, True)
+
+
+@pytest.mark.parametrize("name", ["krylov", "cg-amg"])
+@pytest.mark.parametrize("newton", ["auto", "inexact"])
+def test_solvers_that_iterate_solve_once_a_step(name: str, newton: Newton) -> None:
+    """As a preconditioner such a solver would be asked for all its digits before every product."""
+    block = Block(n=3)
+    p = block.parameters.start
+    state = Model(block, Solver(linear_solver=name, newton=newton)).solve(p)
+    assert state.work.solves == state.work.newton_iterations
+    assert state.work.matvecs == 0
+    assert relative_error(state.u, Model(block).solve(p).u) < 1e-10
 
 
 def test_large_loads_and_buckled_states_are_reached_by_inexact_steps_too() -> None:

@@ -74,7 +74,7 @@ def differentiate(
     state = Model(problem, solver).solve(p)
     estimated = options.get("start") == "chord" and not isinstance(problem, Bar)
     known = counted if estimated or not problem.linear else None
-    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, known, problem.matrix_free, model.inexact)
+    forward = ForwardWork(state.work, problem.linear, model.solver.rtol, known, problem.matrix_free, model.newton)
     return result, counted, route.cost(len(p), forward, **options)
 
 

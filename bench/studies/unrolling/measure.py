@@ -24,6 +24,7 @@ from gradient_routes.bench.studies.judged import TIGHT, Bench, said
 from gradient_routes.bench.studies.options import one_problem
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Gradient, Options, Result, Route
 from gradient_routes.routes.unrolled_ad import chosen
 
@@ -190,7 +191,7 @@ class Unrolled:
         objection = self.route.objection(self.problem, **given)
         if objection is not None:
             raise InputError(f"unrolling: {objection}")
-        self.model = Model(self.problem)  # for every k: JAX traces R and J once
+        self.model = Model(self.problem, Solver(newton="full"))  # for every k: JAX traces R and J once
         self.newton = None
         if self.inner != "direct" and not self.problem.linear:
             self.newton = self.model.solve(self.p).work.newton_iterations
