@@ -49,7 +49,7 @@ class Block(Solid):
         law: options.Law = "neo-hookean",
         nu: options.Nu = 0.3,
         modulus: options.Modulus = None,
-        derivatives: options.Derivatives = "ad",
+        derivatives: options.Derivatives = None,
         unknown: Annotated[DesignName, "what p is"] = "modulus",
         parametrization: Annotated[Literal["log", "raw"] | None, "of moduli: p = log E or p = E [log]"] = None,
         layers: Annotated[int | None, "along z, for unknown=layers [4, fewer on a coarse mesh]"] = None,

@@ -61,7 +61,7 @@ class Plate(Solid):
         law: options.Law = "neo-hookean",
         nu: options.Nu = 0.3,
         modulus: options.Modulus = None,
-        derivatives: options.Derivatives = "ad",
+        derivatives: options.Derivatives = None,
         unknown: Annotated[PlaneDesign, "what p is"] = "modulus",
         parametrization: Annotated[
             Literal["log", "raw"] | None, "of moduli and thickness: p = log E or E [log]"

@@ -25,9 +25,9 @@ ORDER = (
 TRACED = {
     "gradient_routes.problems.jax64",
     "gradient_routes.problems.fem.assembly_jax",
-    "gradient_routes.problems.mechanics.materials",
+    "gradient_routes.problems.mechanics.energies",
     "gradient_routes.problems.mechanics.isotropic_functions",
-    "gradient_routes.problems.mechanics.plane_laws",
+    "gradient_routes.problems.mechanics.plane_energies",
     "gradient_routes.routes.differentiable",
     "gradient_routes.routes.solvers.traced_iterations",
     "gradient_routes.routes.unrolled_newton",

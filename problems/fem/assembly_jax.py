@@ -9,17 +9,16 @@ A = d^2 W/dH^2, H = grad u, at every point, contracted by BLAS in a tenth of the
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.fem.element_matrices import element_matrices
 from gradient_routes.problems.jax64 import jax, jnp
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.mechanics.materials import Energy
 from gradient_routes.problems.problem import Array
-
-CELLS_PER_CHUNK = 128  # their arrays stay in cache
 
 
 class JaxAssembly:
@@ -71,39 +70,6 @@ def _per_cell(q: Any, dx: Any) -> Any:
     return jax.tree.map(lambda c: jnp.broadcast_to(jnp.asarray(c), dx.shape[:1]), q)
 
 
-def element_matrices(A_dx: Array, dN: Array, selected: Array) -> Array:
-    """Entries `pick` (k,), counted row by row, of the matrices sum over points of dN_a,J A_iJjL dN_b,L dx: (n_e, k).
-
-    A_dx (n_e, n_q, m, d, d, m) has the index order J i j L: then two matrix products suffice, without transposes.
-    """
-    n_e, d, (_, n_q, n_a, m) = len(A_dx), A_dx.shape[3], dN.shape
-    row, column = np.divmod(selected, d * n_a)
-    at = (d * row + column % d) * n_a + column // d  # position of (ai)(bj) in a i j b
-    entries = np.empty((n_e, len(selected)), np.result_type(A_dx, dN))
-    for first in range(0, n_e, CELLS_PER_CHUNK):
-        chunk = slice(first, first + CELLS_PER_CHUNK)
-        G = np.ascontiguousarray((dN[chunk] if len(dN) > 1 else dN).transpose(0, 1, 3, 2))  # (chunk, n_q, m, n_a)
-        AG = A_dx[chunk].reshape(-1, n_q, m * d * d, m) @ G  # (chunk, n_q, J i j, b)
-        K = G.reshape(-1, m * n_q, n_a).transpose(0, 2, 1) @ AG.reshape(-1, m * n_q, d * d * n_a)  # (chunk, a, i j b)
-        np.take(K.reshape(-1, d * d * n_a * n_a), at, axis=1, out=entries[chunk])
-    return entries
-
-
-@dataclass(frozen=True)
-class TracedJacobian:
-    """A Jacobian by its compiled products forward(v) and reverse(lam)."""
-
-    forward: Callable[[Array], Any]
-    reverse: Callable[[Array], Any]
-
-    @property
-    def T(self) -> TracedJacobian:
-        return TracedJacobian(self.reverse, self.forward)
-
-    def __matmul__(self, v: Array) -> Array:
-        return np.asarray(self.forward(v))
-
-
 class CompiledResidual:
     """R = dPi/du + g, compiled, with products of its Jacobians for NumPy callers.
 
@@ -136,11 +102,11 @@ class CompiledResidual:
     def __call__(self, u: Array, p: Array) -> Array:
         return np.asarray(self._R(u, p))
 
-    def R_u(self, u: Array, p: Array) -> TracedJacobian:
-        return TracedJacobian(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_T_w(u, p, w))
+    def R_u(self, u: Array, p: Array) -> ByProducts:
+        return ByProducts(lambda v: self._R_u_v(u, p, v), lambda w: self._R_u_T_w(u, p, w))
 
-    def R_p(self, u: Array, p: Array) -> TracedJacobian:
-        return TracedJacobian(lambda v: self._R_p_v(u, p, v), lambda w: self._R_p_T_w(u, p, w))
+    def R_p(self, u: Array, p: Array) -> ByProducts:
+        return ByProducts(lambda v: self._R_p_v(u, p, v), lambda w: self._R_p_T_w(u, p, w))
 
 
 def gradient(f: Callable[..., Any], argument: int) -> Callable[..., Any]:

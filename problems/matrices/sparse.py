@@ -36,7 +36,7 @@ class SymmetricPattern:
 
     def assemble(self, entries: Array) -> SymmetricSparse:
         """Sum entries (n_e, m (m + 1) / 2), the upper triangles of the element matrices, into a matrix."""
-        return SymmetricSparse(self, _accumulate(self.slots, entries.ravel(), len(self.indices)))
+        return SymmetricSparse(self, accumulate(self.slots, entries.ravel(), len(self.indices)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class GeneralPattern:
 
     def assemble(self, entries: Array) -> GeneralSparse:
         """Sum element matrices (n_e, m, m), rows first, into a matrix."""
-        return GeneralSparse(self, _accumulate(self.slots, entries.ravel(), len(self.indices)))
+        return GeneralSparse(self, accumulate(self.slots, entries.ravel(), len(self.indices)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,8 +187,8 @@ def _slots(rows: Array, columns: Array, free: Array, n: int) -> tuple[Array, Arr
     return indptr, (keys % n).astype(np.int32), slots.ravel()
 
 
-def _accumulate(slots: Array, entries: Array, nnz: int) -> Array:
+def accumulate(slots: Array, entries: Array, nnz: int) -> Array:
     """(nnz,) sums of the entries that share a slot."""
     if np.iscomplexobj(entries):
-        return _accumulate(slots, entries.real, nnz) + 1j * _accumulate(slots, entries.imag, nnz)
+        return accumulate(slots, entries.real, nnz) + 1j * accumulate(slots, entries.imag, nnz)
     return np.bincount(slots, weights=entries, minlength=nnz + 1)[:-1]

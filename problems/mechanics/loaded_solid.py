@@ -230,7 +230,7 @@ class LoadedSolid:
         return jax.jit(columns, static_argnums=3)
 
     def tangent_operator(self, u: Array, p: Array) -> Operator:
-        return self._compiled.R_u(u, p)
+        return self._numpy.R_u(u, p) if self.use_numpy else self._compiled.R_u(u, p)
 
     def R_p(self, u: Array, p: Array) -> Operator:
         """R_p (n_u, n_p)."""

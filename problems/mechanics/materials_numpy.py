@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,10 @@ from gradient_routes.problems.problem import Array
 
 POINTS_PER_CHUNK = 1000  # stays in cache; with a power of two, transposed arrays share few cache sets
 IDENTITY = np.eye(3)[..., None]  # (3, 3, 1)
-NEXT, PREVIOUS = [1, 2, 0], [2, 0, 1]  # cyclic indices
 
 Constants = tuple[Any, ...]
 Function = Callable[[Array, Constants], Array]
+Product = Callable[[Array, Array, Constants], Array]
 
 
 @dataclass(frozen=True)
@@ -32,23 +33,40 @@ class NumpyMaterial:
 
     q is a tuple of constants that broadcast against H.shape[:-2]; P (..., 3, 3) first Piola-Kirchhoff stress,
     A (..., 3, 3, 3, 3) with A[..., i, J, k, L] = dP_iJ/dF_kL, P_q a tuple of dP/dq (..., 3, 3), one per constant.
-    Law: P = dW/dF, A = dP/dF, symmetric under (i, J) <-> (k, L); NaN for Re det F <= 0.
+    `first` are the same functions for components first. Law: P = dW/dF, A = dP/dF, symmetric under (i, J) <-> (k, L);
+    NaN for Re det F <= 0.
     """
 
     W: Function
     P: Function
     A: Function
     P_q: Callable[[Array, Constants], tuple[Array, ...]]
+    first: ComponentsFirst
+    n_q: int
+
+
+@dataclass(frozen=True)
+class ComponentsFirst:
+    """W (m,), P (3, 3, m), A (3, 3, 3, 3, m), P_q (n_q, 3, 3, m) of H (3, 3, m); dP(H, dH, q) = A dH (3, 3, m).
+
+    Of a plane body (2, k, m) and so on, k as many columns as H has.
+    """
+
+    W: Function
+    P: Function
+    A: Function
+    P_q: Function
+    dP: Product
 
 
 def at_points(f: Function, *shape: int) -> Function:
-    """Turns f of H (3, 3, m), (*shape, m), into a function of H (..., 3, 3), (..., *shape)."""
+    """Turns f of H (d, k, m), (*shape, m), into a function of H (..., d, k), (..., *shape)."""
     components_last = (len(shape), *range(len(shape)))
 
     def at_every_point(H: Array, q: Constants) -> Array:
-        points = np.broadcast_shapes(H.shape[:-2], *map(np.shape, q))
+        points, entries = np.broadcast_shapes(H.shape[:-2], *map(np.shape, q)), H.shape[-2:]
         m = int(np.prod(points))
-        H = np.broadcast_to(H, (*points, 3, 3)).reshape(m, 3, 3)
+        H = np.broadcast_to(H, (*points, *entries)).reshape(m, *entries)
         q = tuple(np.broadcast_to(c, points).reshape(m) if np.ndim(c) else c for c in q)
         values = np.empty((m, *shape), np.result_type(H, *q, np.float64))
         for first in range(0, m, POINTS_PER_CHUNK):
@@ -61,14 +79,16 @@ def at_points(f: Function, *shape: int) -> Function:
     return at_every_point
 
 
-def numpy_material(W: Function, P: Function, A: Function, P_q: Function, n_q: int) -> NumpyMaterial:
-    """From functions that take the components first; P_q returns (n_q, 3, 3, m)."""
-    stacked = at_points(P_q, n_q, 3, 3)
+def numpy_material(first: ComponentsFirst, n_q: int, shape: tuple[int, int] = (3, 3)) -> NumpyMaterial:
+    """From functions that take the components first, H (*shape, m), of n_q constants."""
+    stacked = at_points(first.P_q, n_q, *shape)
     return NumpyMaterial(
-        at_points(W),
-        at_points(P, 3, 3),
-        at_points(A, 3, 3, 3, 3),
+        at_points(first.W),
+        at_points(first.P, *shape),
+        at_points(first.A, *shape, *shape),
         lambda H, q: tuple(np.moveaxis(stacked(H, q), -3, 0)),
+        first,
+        n_q,
     )
 
 
@@ -76,10 +96,15 @@ def numpy_material(W: Function, P: Function, A: Function, P_q: Function, n_q: in
 class Kinematics:
     """F = I + H, j = J - 1 (m,), G and E (3, 3, m)."""
 
+    H: Array
     F: Array
     j: Array
     G: Array
-    E: Array
+
+    @cached_property
+    def E(self) -> Array:
+        H_T = self.H.swapaxes(0, 1)
+        return np.asarray((self.H + H_T + product(H_T, self.H)) / 2.0)
 
     @property
     def log_J(self) -> Array:
@@ -96,24 +121,37 @@ class Kinematics:
 def kinematics(H: Array) -> Kinematics:
     """NaN where Re J <= 0: inverted elements are not admissible. j = tr H + ((tr H)^2 - H : H^T)/2 + det H."""
     F, tr = IDENTITY + H, trace(H)
-    j = tr + (tr**2 - (H * H.swapaxes(0, 1)).sum(axis=(0, 1))) / 2.0 + (H[0] * cofactor(H)[0]).sum(axis=0)
+    j = tr + (tr**2 - (H * H.swapaxes(0, 1)).sum(axis=(0, 1))) / 2.0 + det(H)
     j = np.where(j.real > -1.0, j, np.nan)
-    E = (H + H.swapaxes(0, 1) + product(H.swapaxes(0, 1), H)) / 2.0
-    return Kinematics(F, j, cofactor(F) / (1.0 + j), E)
+    return Kinematics(H, F, j, cofactor(F) / (1.0 + j))
 
 
 def cofactor(F: Array) -> Array:
-    a, b = F[NEXT], F[PREVIOUS]
-    return np.asarray(a[:, NEXT] * b[:, PREVIOUS] - a[:, PREVIOUS] * b[:, NEXT])
+    cyclic = np.empty((5, 5, *F.shape[2:]), F.dtype)
+    cyclic[:3, :3] = F
+    cyclic[3:, :3] = F[:2]
+    cyclic[:, 3:] = cyclic[:, :2]
+    a, b = cyclic[1:4], cyclic[2:5]
+    return np.asarray(a[:, 1:4] * b[:, 2:5] - a[:, 2:5] * b[:, 1:4])
+
+
+def det(F: Array) -> Array:
+    (a, b, c), (d, e, f), (g, h, i) = F
+    return np.asarray(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
 
 
 def trace(E: Array) -> Array:
     return np.asarray(E[0, 0] + E[1, 1] + E[2, 2])
 
 
+def inner(A: Array, B: Array) -> Array:
+    """A : B, (m,)."""
+    return np.asarray((A * B).sum(axis=(0, 1)))
+
+
 def product(A: Array, B: Array) -> Array:
     """A_iK B_KJ, (3, 3, m)."""
-    return np.asarray((A[:, :, None] * B).sum(axis=1))
+    return np.asarray(np.einsum("iKm,KJm->iJm", A, B))
 
 
 def dyad(a: Array, b: Array) -> Array:
@@ -159,13 +197,22 @@ def neo_hookean_A(H: Array, q: Constants) -> Array:
     return A
 
 
+def neo_hookean_dP(H: Array, dH: Array, q: Constants) -> Array:
+    """A dH = mu dH + lam (G : dH) G - (lam ln J - mu) G dH^T G."""
+    (mu, lam), k = q, kinematics(H)
+    turned = product(k.G, product(dH.swapaxes(0, 1), k.G))
+    return np.asarray(mu * dH + lam * inner(k.G, dH) * k.G - (lam * k.log_J - mu) * turned)
+
+
 def neo_hookean_P_q(H: Array, q: Constants) -> Array:
     """dP/dmu = 2 G E, dP/dlam = ln J G."""
     k = kinematics(H)
     return np.stack([2.0 * product(k.G, k.E), k.log_J * k.G])
 
 
-NEO_HOOKEAN = numpy_material(neo_hookean_W, neo_hookean_P, neo_hookean_A, neo_hookean_P_q, 2)
+NEO_HOOKEAN = numpy_material(
+    ComponentsFirst(neo_hookean_W, neo_hookean_P, neo_hookean_A, neo_hookean_P_q, neo_hookean_dP), n_q=2
+)
 
 
 def mooney_rivlin_W(H: Array, q: Constants) -> Array:
@@ -202,10 +249,23 @@ def mooney_rivlin_A(H: Array, q: Constants) -> Array:
     return A
 
 
+def mooney_rivlin_dP(H: Array, dH: Array, q: Constants) -> Array:
+    """A dH, term by term as in A."""
+    (c1, c2, c), k = q, kinematics(H)
+    F, G, J, dH_T = k.F, k.G, 1.0 + k.j, dH.swapaxes(0, 1)
+    C, h = IDENTITY + 2.0 * k.E, 2.0 * c * k.j * J - 2.0 * (c1 + 2.0 * c2)
+    dP = 2.0 * (c1 + c2 * trace(C)) * dH - 2.0 * c2 * product(dH, C)
+    dP += 2.0 * c2 * (2.0 * inner(F, dH) * F - product(F, product(dH_T, F) + product(F.swapaxes(0, 1), dH)))
+    dP += 2.0 * c * (2.0 * J - 1.0) * J * inner(G, dH) * G - h * product(G, product(dH_T, G))
+    return np.asarray(dP)
+
+
 def mooney_rivlin_P_q(H: Array, q: Constants) -> Array:
     """dP/dc1 = 2 (F - G), dP/dc2 = dI2/dF - 4 G, dP/dc = 2 (J - 1) J G."""
     k = kinematics(H)
     return np.stack([4.0 * product(k.G, k.E), gradient_of_I2(k), 2.0 * k.j * (1.0 + k.j) * k.G])
 
 
-MOONEY_RIVLIN = numpy_material(mooney_rivlin_W, mooney_rivlin_P, mooney_rivlin_A, mooney_rivlin_P_q, 3)
+MOONEY_RIVLIN = numpy_material(
+    ComponentsFirst(mooney_rivlin_W, mooney_rivlin_P, mooney_rivlin_A, mooney_rivlin_P_q, mooney_rivlin_dP), n_q=3
+)

@@ -18,9 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.mechanics.materials import LAWS, Energy, MaterialLaw
-from gradient_routes.problems.mechanics.materials_numpy import NumpyMaterial
+from gradient_routes.problems.mechanics.materials_numpy import (
+    ComponentsFirst,
+    Constants,
+    NumpyMaterial,
+    numpy_material,
+)
 from gradient_routes.problems.mechanics.solid_options import Kind
 from gradient_routes.problems.problem import Array
 
@@ -32,81 +36,26 @@ AT_MOST = 60
 
 @cache
 def plane_law(name: str, kind: Kind) -> MaterialLaw:
-    """The law `name` of solids for bodies of a kind."""
+    """The law `name` of solids for bodies of a kind. JAX is imported with its energy only."""
     law = LAWS[name]
-    T = _placement(kind)
-    if kind != "plane-stress":
-        return replace(law, W=_placed(law.W, T), numpy=law.numpy and _placed_by_hand(law.numpy, T))
-    W = linear_plane_stress(law.W) if name == "linear" else plane_stress(law.W, T)
-    return replace(law, W=W, numpy=law.numpy and _plane_stress_by_hand(law.numpy, T))
+
+    def energy() -> Energy:
+        from gradient_routes.problems.mechanics.plane_energies import plane_energy
+
+        return plane_energy(name, kind)
+
+    by_hand = None
+    if law.numpy is not None:
+        stress = kind == "plane-stress"
+        by_hand = _plane_stress_by_hand(law.numpy) if stress else _placed_by_hand(law.numpy, placement(kind))
+    return replace(law, numpy=by_hand, energy=energy)
 
 
-def _placement(kind: Kind) -> Array:
+def placement(kind: Kind) -> Array:
     """T (9, 2 m)."""
     if kind != "axisymmetric":
         return np.eye(9)[:, IN_PLANE]
     return np.insert(np.eye(9)[:, HOOP], 5, 0.0, axis=1)
-
-
-def _placed(W: Energy, T: Array) -> Energy:
-    return lambda H, q: W((T @ H.ravel()).reshape(3, 3), q)
-
-
-def linear_plane_stress(W: Energy) -> Energy:
-    """h = -lam/(lam + 2 mu) (H_11 + H_22): the energy of a solid with lam replaced by 2 lam mu/(lam + 2 mu)."""
-
-    def condensed(H: Any, q: Any) -> Any:
-        mu, lam = q
-        return W(H, (mu, 2.0 * lam * mu / (lam + 2.0 * mu)))
-
-    return condensed
-
-
-def plane_stress(W: Energy, T: Array) -> Energy:
-    """min over h of W(T H + h e), differentiable to any order."""
-
-    def at(H: Any, h: Any, q: Any) -> Any:
-        return W((T @ H.ravel()).reshape(3, 3) + h * E_33, q)
-
-    def P_33(H: Any, h: Any, q: Any) -> Any:
-        return jax.jvp(lambda h: at(H, h, q), (h,), (jnp.ones_like(h),))[1]
-
-    def stress_and_modulus(H: Any, h: Any, q: Any) -> tuple[Any, Any]:
-        """P_33 and A_3333."""
-        return jax.jvp(lambda h: P_33(H, h, q), (h,), (jnp.ones_like(h),))
-
-    @jax.custom_jvp
-    def thinning(H: Any, q: Any) -> Any:
-        close = CLOSE * jnp.abs(H).max()
-
-        def step(state: Any) -> Any:
-            h, size, _, k = state
-            return *newton_step(h, *stress_and_modulus(H, h, q), jnp), size, k + 1
-
-        def far(state: Any) -> Any:
-            return (state[2] > close) & (state[3] < AT_MOST)  # the last step but one was not small
-
-        zero = jnp.zeros((), jnp.result_type(H, *q))
-        h, size, *_ = jax.lax.while_loop(far, step, (zero, jnp.inf, jnp.inf, 0))
-        return jnp.where(size <= close, h, jnp.nan)  # no such h: the point can bear no plane stress
-
-    @thinning.defjvp
-    def _(primals: Any, tangents: Any) -> tuple[Any, Any]:
-        (H, q), h = primals, thinning(*primals)
-        dP_33 = jax.jvp(lambda H, q: P_33(H, h, q), primals, tangents)[1]
-        return h, -dP_33 / stress_and_modulus(H, h, q)[1]
-
-    @jax.custom_jvp
-    def condensed(H: Any, q: Any) -> Any:
-        return at(H, thinning(H, q), q)
-
-    @condensed.defjvp
-    def _(primals: Any, tangents: Any) -> tuple[Any, Any]:
-        """dW at fixed h, as dW/dh = P_33 = 0; this h depends on H and q in further derivatives."""
-        h = thinning(*primals)
-        return jax.jvp(lambda H, q: at(H, h, q), primals, tangents)
-
-    return condensed
 
 
 def newton_step(h: Any, P: Any, A: Any, xp: Any) -> tuple[Any, Any]:
@@ -122,35 +71,43 @@ def newton_step(h: Any, P: Any, A: Any, xp: Any) -> tuple[Any, Any]:
     return h + F * dx / (1.0 - dx / 2.0), xp.abs(dx)
 
 
-def _placed_by_hand(material: NumpyMaterial, T: Array) -> NumpyMaterial:
-    def solid(H: Array) -> Array:
-        return np.asarray(H.reshape(*H.shape[:-2], -1) @ T.T).reshape(*H.shape[:-2], 3, 3)
+def _placed_by_hand(law: NumpyMaterial, T: Array) -> NumpyMaterial:
+    solid, shape = law.first, (2, T.shape[1] // 2)
+
+    def placed(H: Array) -> Array:
+        return np.asarray(T @ H.reshape(T.shape[1], -1)).reshape(3, 3, -1)
 
     def plane(P: Array) -> Array:
-        return np.asarray(P.reshape(*P.shape[:-2], 9) @ T).reshape(*P.shape[:-2], 2, -1)
+        return np.asarray(T.T @ P.reshape(9, -1)).reshape(*shape, -1)
 
     def moduli(A: Array) -> Array:
-        points, m = A.shape[:-4], T.shape[1] // 2
-        return np.asarray(T.T @ A.reshape(*points, 9, 9) @ T).reshape(*points, 2, m, 2, m)
+        return np.asarray(np.einsum("ax,abm,by->xym", T, A.reshape(9, 9, -1), T)).reshape(*shape, *shape, -1)
 
-    return NumpyMaterial(
-        lambda H, q: material.W(solid(H), q),
-        lambda H, q: plane(material.P(solid(H), q)),
-        lambda H, q: moduli(material.A(solid(H), q)),
-        lambda H, q: tuple(plane(P_c) for P_c in material.P_q(solid(H), q)),
+    first = ComponentsFirst(
+        W=lambda H, q: solid.W(placed(H), q),
+        P=lambda H, q: plane(solid.P(placed(H), q)),
+        A=lambda H, q: moduli(solid.A(placed(H), q)),
+        P_q=lambda H, q: np.stack([plane(P) for P in solid.P_q(placed(H), q)]),
+        dP=lambda H, dH, q: plane(solid.dP(placed(H), placed(dH), q)),
     )
+    return numpy_material(first, law.n_q, shape)
 
 
-def _plane_stress_by_hand(material: NumpyMaterial, T: Array) -> NumpyMaterial:
-    def solid(H: Array, q: tuple[Any, ...]) -> Array:
+def _plane_stress_by_hand(law: NumpyMaterial) -> NumpyMaterial:
+    solid = law.first
+
+    def by_h(H: Array, q: Constants) -> Array:
+        """dP/dh = A e, (3, 3, m)."""
+        return solid.dP(H, np.broadcast_to(E_33[..., None], H.shape), q)
+
+    def placed(H: Array, q: Constants) -> Array:
         """T H + h e."""
-        points = np.broadcast_shapes(H.shape[:-2], *map(np.shape, q))
-        H_3D = np.zeros((*points, 3, 3), np.result_type(H, *q))
-        H_3D[..., :2, :2] = H
-        h, size, close = H_3D[..., 2, 2], np.array(np.inf), CLOSE * np.abs(H).max(axis=(-2, -1))
+        H_3D = np.zeros((3, 3, H.shape[2]), np.result_type(H, *q))
+        H_3D[:2, :2] = H
+        h, size, close = H_3D[2, 2], np.array(np.inf), CLOSE * np.abs(H).max(axis=(0, 1))
         with np.errstate(all="ignore"):  # NaN is a result here, as in JAX
             for _ in range(AT_MOST):
-                P, A = material.P(H_3D, q)[..., 2, 2], material.A(H_3D, q)[..., 2, 2, 2, 2]
+                P, A = solid.P(H_3D, q)[2, 2], by_h(H_3D, q)[2, 2]
                 if not (size > close).any():
                     h -= P / A
                     break
@@ -158,20 +115,26 @@ def _plane_stress_by_hand(material: NumpyMaterial, T: Array) -> NumpyMaterial:
             h[~(size <= close)] = np.nan  # no such h: the point can bear no plane stress
         return H_3D
 
-    def moduli(A: Array) -> Array:
-        a = A[..., :2, :2, 2, 2]
-        return np.asarray(
-            A[..., :2, :2, :2, :2] - a[..., None, None] * a[..., None, None, :, :] / A[..., 2:, 2:, 2:, 2:]
-        )
+    def moduli(H: Array, q: Constants) -> Array:
+        A = solid.A(H, q)
+        a = A[:2, :2, 2, 2]
+        return np.asarray(A[:2, :2, :2, :2] - a[:, :, None, None] * (a / A[2, 2, 2, 2]))
 
-    def by_constants(H: Array, q: tuple[Any, ...]) -> tuple[Array, ...]:
-        A = material.A(H, q)
-        dh = A[..., :2, :2, 2, 2] / A[..., 2:, 2:, 2, 2]
-        return tuple(P_c[..., :2, :2] - dh * P_c[..., 2:, 2:] for P_c in material.P_q(H, q))
+    def by_constants(H: Array, q: Constants) -> Array:
+        a, P_q = by_h(H, q), solid.P_q(H, q)
+        return np.asarray(P_q[:, :2, :2] - P_q[:, 2, 2][:, None, None] * (a[:2, :2] / a[2, 2]))
 
-    return NumpyMaterial(
-        lambda H, q: material.W(solid(H, q), q),
-        lambda H, q: material.P(solid(H, q), q)[..., :2, :2],
-        lambda H, q: moduli(material.A(solid(H, q), q)),
-        lambda H, q: by_constants(solid(H, q), q),
+    def by_direction(H: Array, dH: Array, q: Constants) -> Array:
+        a, dH_3D = by_h(H, q), np.zeros(H.shape, np.result_type(H, dH))
+        dH_3D[:2, :2] = dH
+        dH_3D[2, 2] = -(a[:2, :2] * dH).sum(axis=(0, 1)) / a[2, 2]
+        return solid.dP(H, dH_3D, q)[:2, :2]
+
+    first = ComponentsFirst(
+        W=lambda H, q: solid.W(placed(H, q), q),
+        P=lambda H, q: solid.P(placed(H, q), q)[:2, :2],
+        A=lambda H, q: moduli(placed(H, q), q),
+        P_q=lambda H, q: by_constants(placed(H, q), q),
+        dP=lambda H, dH, q: by_direction(placed(H, q), dH, q),
     )
+    return numpy_material(first, law.n_q, (2, 2))

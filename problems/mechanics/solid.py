@@ -66,7 +66,8 @@ class Solid(Problem):
         """`options` of the problem, which its checks have passed; directions (cases, d) of its loads."""
         o = SimpleNamespace(**options)
         self._options, self.mesh = options, mesh
-        use_numpy = o.derivatives == "hand"
+        exist = law.numpy is not None and o.unknown in MATERIAL and o.load != "follower"
+        use_numpy = exist if o.derivatives is None else o.derivatives == "hand"
         if use_numpy and law.numpy is None:
             raise InputError(
                 f"{self.name}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad"
@@ -109,7 +110,7 @@ class Solid(Problem):
         self.linear = o.law == "linear" and o.load != "follower"
         self.affine = self.linear and o.unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
-        self.matrix_free = not use_numpy
+        self.matrix_free = self.solid.symmetric or not use_numpy
         self.noise, self.seed = standard_deviation(o.noise, measured, self.name), o.seed
         self.synthetic = o.data == "twin"
         if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:

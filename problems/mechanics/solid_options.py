@@ -26,7 +26,9 @@ Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom:
 Law = Annotated[LawName, "stored energy"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
 Modulus = Annotated[float | None, "Young's, to start from or known [1; fitted to a file's data]"]
-Derivatives = Annotated[Literal["ad", "hand"], "P, dP/dF, dP/dq by JAX or hand-derived in NumPy"]
+Derivatives = Annotated[
+    Literal["ad", "hand"] | None, "P, dP/dF, dP/dq by JAX or hand-derived in NumPy [hand where they exist]"
+]
 LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
 Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every row [by its header]"]
 Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]

@@ -21,7 +21,8 @@ from gradient_routes.problems.matrices.sparse import (
     SymmetricPattern,
     SymmetricSparse,
 )
-from gradient_routes.problems.mechanics.materials import lame, neo_hookean
+from gradient_routes.problems.mechanics.energies import neo_hookean
+from gradient_routes.problems.mechanics.materials import lame
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
