@@ -128,7 +128,8 @@ class Inexact:
     """|R - R_u du| <= eta |R| by Krylov iterations preconditioned with the factors of an earlier u.
 
     eta = sqrt(|R| / scale), at most 0.05 and at least what the goal needs: fewer products in all than with the
-    quadratic choices of Eisenstat & Walker 1996, because a residual costs less than the product that it saves. New
+    quadratic choices of Eisenstat & Walker 1996, because a residual costs less than the product that it saves. A rate
+    that promises so much that no product is made is forgotten where it does not hold. New
     factors and an exact step are made where more than WORTH products are to be expected.
     """
 
@@ -136,7 +137,7 @@ class Inexact:
         self._do = operations
         self.factors = factors
         self.rate: float | None = math.inf if factors is not None else None
-        self._before = math.inf
+        self._before, self._trusted = math.inf, False
 
     def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
         self._do.step()
@@ -146,6 +147,8 @@ class Inexact:
             return self._exact(self._do.assemble(u), R)
         if self.rate is None:  # after an exact step, the ratio of residuals estimates the contraction by its factors
             self.rate = size / before
+        elif self._trusted and size > LOOSEST * before:
+            self.rate = math.inf
         worth, goal = self._worth(), self._aim(size, scale, goal)
         if self.rate < 1.0 and products_to(self.rate, size, goal) > worth:
             return self._exact(self._do.assemble(u), R)
@@ -162,7 +165,7 @@ class Inexact:
         )
         if not done.converged:
             return self._exact(self._do.assemble(u) if self._do.operator else K, R)
-        self.rate = done.rate
+        self.rate, self._trusted = done.rate, done.products == 0
         return done.x, self.factors.norm
 
     def _aim(self, size: float, scale: float, goal: float) -> float:
@@ -178,7 +181,7 @@ class Inexact:
         return self._do.substitute(self.factors, b)
 
     def _exact(self, K: Any, R: Array) -> Correction:
-        self.factors, self.rate = None, None
+        self.factors, self.rate, self._trusted = None, None, False
         self.factors = self._do.factorize(K)
         return self._do.substitute(self.factors, R), self.factors.norm
 

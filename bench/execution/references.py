@@ -124,7 +124,7 @@ class Judges:
 
     @cached_property
     def _J(self) -> float:
-        return self.model.value(self.p)
+        return Model(self.model.problem, self.model.solver).value(self.p)  # whose factors are released
 
     def _another_state(self, J: float | None) -> bool:
         """Whether a judge's J is not the J of real solves: where R(u, p) = 0 has several solutions it may be."""
