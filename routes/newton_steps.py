@@ -220,7 +220,8 @@ class Auto(Inexact):
 
     def _worth(self) -> float:
         assert self.factors is not None
-        return self.factors.nbytes / (PER_ROW * self._n)
+        per_row = min(self.factors.nbytes / self._n, 2.0 * self._n)  # of half a triangle, where workspace is more
+        return per_row / PER_ROW
 
 
 class Truncated:

@@ -171,7 +171,7 @@ def test_counted_work_is_the_declared_work(name: str, route: Route, options: dic
 
 def test_auto_ends_a_solve_as_full_steps_do_on_fewer_factors() -> None:
     """Its last factors are so near the solution that an adjoint solve takes two products at most."""
-    block = Block(n=5)
+    block = Block(n=8)
     p = block.parameters.start
     full, auto = (Model(block, Solver(newton=newton)) for newton in ("full", "auto"))
     state = auto.solve(p)
