@@ -4,7 +4,7 @@
 # [tool.gradient-routes]
 # summary = "Lineax and Optimistix: implicit differentiation of a linear solve, or of Newton's method"
 # cases = { bar = {} }
-# options = { solver = ["tridiagonal", "cg", "newton"] }
+# options = { solver = ["tridiagonal", "cg", "newton", "newton-unrolled"] }
 # ///
 """The bar in Lineax, a tridiagonal operator and its solve, or in Optimistix, the root of the residual."""
 
@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import lineax as lx
 import optimistix as optx
+from jax_sweeps import value_and_gradient
 from routes_adapter import serve
 
 jax.config.update("jax_enable_x64", True)
@@ -23,7 +24,7 @@ class Bar:
     def load(self, case):
         self.case = case
         self.f = jnp.zeros(case["n"]).at[-1].set(case["load"])
-        self.J_and_gradient = eqx.filter_jit(jax.value_and_grad(self.J))
+        self.J = jax.jit(self.J, static_argnums=(1, 2))
 
     def J(self, p, rtol, solver="tridiagonal"):
         E = jnp.exp(p) if self.case["parametrization"] == "log" else p
@@ -31,9 +32,10 @@ class Bar:
         diagonal, beside = k + jnp.append(k[1:], 0.0), -k[1:]
         K = lx.TridiagonalLinearOperator(diagonal, beside, beside)
         atol = rtol * self.case["load"]  # with 0, CG ends after a step and Newton never
-        if solver == "newton":
-            newton = optx.Newton(rtol, atol)
-            u = optx.root_find(lambda u, K: K.mv(u) - self.f, newton, jnp.zeros_like(self.f), args=K).value
+        if solver.startswith("newton"):
+            newton, R = optx.Newton(rtol, atol), lambda u, K: K.mv(u) - self.f
+            way = optx.RecursiveCheckpointAdjoint() if solver == "newton-unrolled" else optx.ImplicitAdjoint()
+            u = optx.root_find(R, newton, jnp.zeros_like(self.f), args=K, adjoint=way).value
         else:
             K = lx.TaggedLinearOperator(K, lx.positive_semidefinite_tag)
             u = lx.linear_solve(K, self.f, lx.CG(rtol, atol) if solver == "cg" else lx.Tridiagonal()).value
@@ -43,8 +45,7 @@ class Bar:
         return float(self.J(p, rtol))
 
     def gradient(self, p, rtol, adjoint_rtol, options):
-        J, g = self.J_and_gradient(p, rtol, options["solver"])
-        return {"J": float(J), "gradient": jax.device_get(g)}
+        return value_and_gradient(lambda p: self.J(p, rtol, **options), p)
 
 
 serve(Bar(), "lineax", versions=["lineax", "optimistix", "jax"], tighten=True)

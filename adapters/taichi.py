@@ -9,6 +9,7 @@
 
 import math
 import os
+from time import perf_counter
 
 import taichi as ti
 from routes_adapter import serve
@@ -49,13 +50,15 @@ class Bar:
         E = [math.exp(x) if self.log else x for x in p]
         root_L, root_mu = 2 * (self.k * max(E)) ** 0.5, 2 * (self.k * min(E)) ** 0.5 * math.sin(math.pi / (4 * n + 2))
         alpha, rate = 4 / (root_L + root_mu) ** 2, (root_L - root_mu) / (root_L + root_mu)
-        u = zeros(int(1.2 * math.log(rtol) / math.log(rate)) + 3, n + 2)
+        u, start = zeros(int(1.2 * math.log(rtol) / math.log(rate)) + 3, n + 2), perf_counter()
         with ti.ad.Tape(J):
             springs(p_, self.k, self.log, k)
             for j in range(1, u.shape[0] - 1):
                 descend(k, self.case["load"], alpha, rate**2, j, u)
             misfit(u, self.case["sensors"], self.case["data"], J)
-        return {"J": J[0], "gradient": p_.grad.to_numpy(), "tape_bytes": 8 * math.prod(u.shape)}
+            solved = perf_counter()
+        seconds = {"forward_s": solved - start, "backward_s": perf_counter() - solved}
+        return {"J": J[0], "gradient": p_.grad.to_numpy(), "tape_bytes": 8 * math.prod(u.shape), **seconds}
 
 
 def zeros(*shape):

@@ -36,12 +36,18 @@ class Bar:
 
     def gradient(self, p, rtol, adjoint_rtol, options):
         solve = torch.linalg.solve if options["strategy"] == "implicit" else self.iterations
-        p, start = torch.tensor(p, requires_grad=True), perf_counter()
-        J = self.J(p, solve)
+        p, start, saved = torch.tensor(p, requires_grad=True), perf_counter(), {}
+
+        def save(x):
+            saved[x.data_ptr()] = x.nbytes
+            return x
+
+        with torch.autograd.graph.saved_tensors_hooks(save, lambda x: x):
+            J = self.J(p, solve)
         solved = perf_counter()
         J.backward()
-        seconds = {"forward_s": solved - start, "backward_s": perf_counter() - solved}
-        return {"J": J.item(), "gradient": p.grad.numpy(), **seconds}
+        phases = {"forward_s": solved - start, "backward_s": perf_counter() - solved, "tape_bytes": sum(saved.values())}
+        return {"J": J.item(), "gradient": p.grad.numpy(), **phases}
 
     @staticmethod
     def iterations(K, f):

@@ -38,6 +38,7 @@ from gradient_routes.routes.tally import Work
 
 KEEP_GRADIENT = 64  # parameters; longer gradients are kept on demand
 SMALL = 1e-6  # relative residual of a state that counts as converged
+WARM = ("forward_s", "backward_s", "peak_bytes")  # of another code, whose first call may compile
 WRONG = 1e-2  # relative error of a gradient at a converged state that deserves a warning
 
 
@@ -328,7 +329,7 @@ def _count(
     told = results[0].peer
     if told is not None:
         peak, method = told.get("peak_bytes"), f"by {told['name']} itself"
-        record.add({"peer": record.known["peer"] | ({} if peak is None else {"peak_bytes": peak})})
+        record.add({"peer": record.known["peer"] | {name: told[name] for name in WARM if name in told}})
     work = model.tally.work - before
     declared = route.cost(len(context.p), replace(context.prices.declared, counted=work), **options)
     record.add({"peak_bytes": peak, "memory_method": method})
