@@ -14,36 +14,34 @@ from time import perf_counter
 
 from routes_adapter import NotConverged, serve
 from mpi4py import MPI  # before DOLFINx, whose wheel finds its library by that
-import basix.ufl
 import dolfinx_adjoint
 import numpy as np
 import pyadjoint
 import ufl
-from dolfinx import fem, mesh
+from dolfinx import fem
+from dolfinx_case import displacements
 
 MUMPS = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
 
 class Block:
     def load(self, case):
-        hex8, order = basix.ufl.element("Lagrange", "hexahedron", 1, shape=(3,)), [0, 1, 3, 2, 4, 5, 7, 6]  # of VTK's
-        body = mesh.create_mesh(MPI.COMM_SELF, case["cells"][:, order], hex8, case["points"])
-        V, Q, read = fem.functionspace(body, hex8), fem.functionspace(body, ("DG", 0)), case["sensors"]
-        at = np.empty(len(case["points"]), np.int32)  # the node of V, by the case's
-        at[np.array(body.geometry.input_global_indices)[body.geometry.dofmaps[0]]] = V.dofmap.list
+        V, node = displacements(case, MPI.COMM_SELF)
+        Q = fem.functionspace(V.mesh, ("DG", 0))
         u, f, d, S, p = (dolfinx_adjoint.Function(space) for space in (V, V, V, V, Q))
-        for nodal, nodes, values in ((f, ..., case["forces"]), (d, read, case["data"]), (S, read, 1)):
-            nodal.x.array.reshape(-1, 3)[at[nodes]] = values
+        read, of = np.nonzero(node[:, None] == case["sensors"])
+        f.x.array[:] = case["forces"][node].ravel()
+        d.x.array.reshape(-1, 3)[read], S.x.array.reshape(-1, 3)[read] = case["data"][of], 1
         E, nu, F = ufl.exp(p) if case["parametrization"] == "log" else p, case["nu"], ufl.Identity(3) + ufl.grad(u)
         mu, lmbda, ln_J = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu)), ufl.ln(ufl.det(F))
         W = mu / 2 * (ufl.inner(F, F) - 3) - mu * ln_J + lmbda / 2 * ln_J**2
         R = ufl.derivative(W * ufl.dx(metadata={"quadrature_degree": 3}) - ufl.inner(f, u) * ufl.dP, u)
         self.J = ufl.inner(S, ufl.elem_mult(u - d, u - d)) / 2 * ufl.dP
-        clamp = fem.dirichletbc(np.zeros(3), np.sort(at[case["clamped"]]), V)
+        clamp = fem.dirichletbc(np.zeros(3), np.flatnonzero(np.isin(node, case["clamped"])).astype(np.int32), V)
         self.problem = dolfinx_adjoint.NonlinearProblem(
             R, u, bcs=[clamp], petsc_options=MUMPS | {"snes_stol": 1e-14}, adjoint_petsc_options=MUMPS
         )
-        self.u, self.p, self.modulus = u, p, case["modulus"][body.topology.original_cell_index]
+        self.u, self.p, self.modulus = u, p, case["modulus"][V.mesh.topology.original_cell_index]
 
     def value(self, p, rtol=1e-12):
         pyadjoint.set_working_tape(pyadjoint.Tape())

@@ -1,4 +1,4 @@
-"""Making the environment of an adapter, by uv where it is installed, by venv and pip where not."""
+"""Making the environment of an adapter: by uv where it is installed, by venv and pip where not, by cc for one in C."""
 
 from __future__ import annotations
 
@@ -23,9 +23,27 @@ def create(manifest: Manifest) -> Path:
 
     Raises InputError where no interpreter fits, NotInstalled with the last line of what failed.
     """
-    python, folder = fitting(manifest.requires_python, manifest.name), manifest.folder
+    folder = manifest.folder
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
+    if manifest.compiled:
+        _compile(manifest)
+    else:
+        _install(manifest)
+    manifest.mark.write_text("\n".join((*manifest.dependencies, *manifest.without_dependencies)) + "\n")
+    return folder
+
+
+def _compile(manifest: Manifest) -> None:
+    cc = os.environ.get("CC") or "cc"
+    if shutil.which(cc) is None:
+        raise NotInstalled(f"{manifest.name}: no C compiler {cc} here - install one, or name it in CC")
+    manifest.folder.mkdir()
+    _run([cc, "-O2", "-o", str(manifest.program), str(manifest.script), "-lm"], manifest.name)
+
+
+def _install(manifest: Manifest) -> None:
+    python, folder = fitting(manifest.requires_python, manifest.name), manifest.folder
     uv, nothing = shutil.which("uv"), not (manifest.dependencies or manifest.without_dependencies)
     make = [uv, "venv", "--quiet", "--python", str(python)] if uv else [str(python), "-m", "venv"]
     _run([*make, *(["--without-pip"] if nothing and not uv else []), str(folder)], manifest.name)
@@ -34,8 +52,6 @@ def create(manifest: Manifest) -> Path:
     for needed, alone in ((manifest.dependencies, []), (manifest.without_dependencies, ["--no-deps"])):
         if needed:
             _run([*install, *alone, *needed], manifest.name)
-    manifest.mark.write_text("\n".join((*manifest.dependencies, *manifest.without_dependencies)) + "\n")
-    return folder
 
 
 def _run(command: Sequence[str], who: str) -> None:

@@ -30,7 +30,7 @@ def command_of(text: str) -> Command:
     found = manifest(Path(words[0]).absolute())
     if not found.ready:
         raise Unsupported(f"{text} has no environment here - make it: routes environments create {text}")
-    return Command(found.command, {name: choices[0] for name, choices in found.options.items()})
+    return Command(found.command(found.defaults), found.defaults)
 
 
 def words_of(text: str) -> list[str]:

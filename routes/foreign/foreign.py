@@ -99,7 +99,7 @@ def of_manifest(each: Manifest) -> Route:
         return objection
 
     def function(model: Model, p: Array, **options: Any) -> Gradient:
-        return gradients(Command(each.command, options), each.name, model)
+        return gradients(Command(each.command(options), options), each.name, model)
 
     function.__doc__ = each.summary
     function.__signature__ = inspect.Signature(  # type: ignore[attr-defined]

@@ -1,5 +1,7 @@
 """What an adapter's script says of itself in its inline metadata (PEP 723), read without running it.
 
+A program in C has them in a comment.
+
     # /// script
     # requires-python = ">=3.11"
     # dependencies = ["torch==2.13.0"]
@@ -10,7 +12,9 @@
     # ///
 
 cases: the kinds of Problem.case() that it knows, with the values it knows where it does not know all. options: each
-with its choices, the default first. environment, where it is not the script's name: one that adapters share.
+with its choices, the default first. environment, where it is not the script's name: one that adapters share. launch:
+a command of the environment that starts it, ["mpiexec", "-n", "{ranks}"] with its options, where these are not the
+defaults.
 """
 
 from __future__ import annotations
@@ -49,21 +53,43 @@ class Manifest:
     cases: Mapping[str, Mapping[str, list[Any]]]
     options: Mapping[str, list[str]]
     environment: str
+    launch: tuple[str, ...] = ()
 
     @cached_property
     def folder(self) -> Path:
         """Of its environment: another one for every change of what it needs."""
-        needs = "\n".join((self.requires_python, *self.dependencies, *self.without_dependencies))
+        source = (self.script.read_text(),) if self.compiled else ()
+        needs = "\n".join((self.requires_python, *self.dependencies, *self.without_dependencies, *source))
         return environments() / f"{self.environment}-{hashlib.sha256(needs.encode()).hexdigest()[:8]}"
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the script is a program in C, which has no interpreter and no packages."""
+        return self.script.suffix == ".c"
+
+    @property
+    def program(self) -> Path:
+        """What it is compiled to."""
+        return self.folder / "adapter"
 
     @property
     def python(self) -> Path:
         return self.folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 
     @property
-    def command(self) -> tuple[str, ...]:
+    def defaults(self) -> dict[str, str]:
+        """Of its options."""
+        return {name: choices[0] for name, choices in self.options.items()}
+
+    def command(self, options: Mapping[str, str]) -> tuple[str, ...]:
         """That starts it. Its own folder is not searched for modules: adapters are named as what they adapt."""
-        return str(self.python), "-c", START, str(ADAPTERS / "python"), str(self.script)
+        if self.compiled:
+            return (str(self.program),)
+        program = str(self.python), "-c", START, str(ADAPTERS / "python"), str(self.script)
+        words = [word.format(**options) for word in self.launch]
+        if words == [word.format(**self.defaults) for word in self.launch]:
+            return program
+        return str(self.python.with_name(words[0])), *words[1:], *program
 
     @property
     def ready(self) -> bool:
@@ -115,6 +141,7 @@ def manifest(script: Path) -> Manifest:
             cases={str(kind): dict(known) for kind, known in ours["cases"].items()},
             options={str(name): list(map(str, choices)) for name, choices in ours.get("options", {}).items()},
             environment=str(ours.get("environment", script.stem)),
+            launch=tuple(map(str, ours.get("launch", ()))),
         )
     except (tomllib.TOMLDecodeError, AttributeError, TypeError, ValueError) as error:
         raise InputError(f"adapter {script}: its inline metadata cannot be read: {error} - mend them") from None
@@ -124,4 +151,4 @@ def manifest(script: Path) -> Manifest:
 
 def shipped() -> dict[str, Path]:
     """The adapters of this package: name -> script."""
-    return {path.stem: path for path in sorted(ADAPTERS.glob("*.py"))}
+    return {path.stem: path for path in sorted(ADAPTERS.iterdir()) if path.suffix in (".py", ".c")}

@@ -3,13 +3,13 @@
 from functools import cache
 
 from gradient_routes.routes.foreign.foreign import of_manifest
-from gradient_routes.routes.foreign.manifest import ADAPTERS, manifest
+from gradient_routes.routes.foreign.manifest import manifest, shipped
 from gradient_routes.routes.route import Route
 
 
 @cache
 def __getattr__(name: str) -> Route:
-    script = ADAPTERS / f"{name.replace('_', '-')}.py"
-    if not script.is_file():
-        raise AttributeError(f"no adapter {script.stem}")
+    script = shipped().get(name.replace("_", "-"))
+    if script is None:
+        raise AttributeError(f"no adapter {name}")
     return of_manifest(manifest(script))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -109,6 +110,19 @@ def test_of_a_failing_install_the_last_line_is_shown_and_nothing_is_taken_for_re
     pip = [sys.executable, "-m", "pip", "install", "--no-index", "no-package-of-that-name"]
     with pytest.raises(building.NotInstalled, match=r"bar: python.* ended with exit code 1: ERROR: No matching dist"):
         building._run(pip, "bar")
+
+
+@pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler here: install one that is called cc")
+def test_a_program_in_C_is_compiled(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = manifest(shipped()["executable"])
+    monkeypatch.setattr(building.shutil, "which", lambda name: name == "cc" or None)
+    ran = cli("environments", "create", "executable")
+    assert (ran.code, found.ready) == (0, True), ran.err
+    assert "gradient on bar off ours by" in ran.out
+    monkeypatch.setenv("CC", "no-such")
+    ran = cli("environments", "create", "executable")
+    says = "executable: no C compiler no-such here - install one, or name it in CC"
+    assert (ran.code, ran.err, found.ready) == (1, f"routes: {says}\n", False)
 
 
 def test_a_failed_environment_is_not_ready(monkeypatch: pytest.MonkeyPatch, cli) -> None:

@@ -25,6 +25,7 @@ PROBLEMS = {"bar": lambda **options: Bar(n=8, **options), "hyperelastic": lambda
 TIGHT = {"bar": Solver(rtol=1e-13, adjoint_rtol=1e-13), "hyperelastic": Solver(rtol=1e-14, adjoint_rtol=1e-13)}
 # the others: 1e-12, the tolerance times a condition number; the gradient of an iterate lags behind it by k rho^k
 ACCURACY = {"warp-unrolled": 1e-10, "taichi": 1e-10}
+RANKS = 2  # of MPI: more than that on few processors wait for each other
 DEFAULTS = 1e-4  # of frameworks that stop at an absolute |R| of 1e-6 by default
 
 
@@ -34,6 +35,8 @@ def cases() -> Iterator[Any]:
         for kind, (number, choices) in product(found.cases, enumerate(product(*found.options.values()))):
             for parametrization in ("raw", "log")[number > 0 :]:
                 options = dict(zip(found.options, choices, strict=True))
+                if int(options.get("ranks", 1)) > RANKS:
+                    continue
                 label = "-".join((name, kind, parametrization, *choices))
                 yield pytest.param(found, kind, parametrization, options, id=label)
 
@@ -56,8 +59,12 @@ def test_the_gradient_is_ours(found: Manifest, kind: str, parametrization: str, 
 
 
 @pytest.mark.parametrize("name", MANIFESTS)
-def test_an_adapter_is_a_route_and_short(name: str) -> None:
+def test_an_adapter_is_a_route(name: str) -> None:
     assert entries("route")[name].failure is None
+
+
+@pytest.mark.parametrize("name", [name for name in MANIFESTS if not MANIFESTS[name].compiled])
+def test_an_adapter_is_short(name: str) -> None:
     code = MANIFESTS[name].script.read_text().split('"""', 2)[2].splitlines()
     assert len([line for line in code if line.strip() and not line.lstrip().startswith("#")]) <= 45
 

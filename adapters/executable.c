@@ -1,6 +1,13 @@
-/* The bar in C: solved by cumulative sums, its gradient derived by hand. No library but the standard one.
+/*
+# /// script
+# [tool.gradient-routes]
+# summary = "a program in C: the bar by cumulative sums, its gradient by hand; compiled by cc -O2"
+# cases = { bar = {} }
+# ///
 
-       cc -O2 -o bar adapters/bar.c -lm
+   The bar in C, without a library but the standard one. By hand:
+
+       cc -O2 -o bar adapters/executable.c -lm
        routes run --problem bar --route adjoint --route 'adapter[command=./bar]'
 
    Speaks version 1 of the adapter protocol (docs/explanation/adapter-protocol.md). Little-endian machines. */
@@ -85,7 +92,7 @@ static void *taken(const char *name) {
 
 static void load_case(void) {
     if (!says("kind", "bar\"") || !array("sensors") || !array("data")) {
-        error("unsupported", "bar.c knows the kind bar, with sensors and data");
+        error("unsupported", "it knows the kind bar, with sensors and data");
         return;
     }
     n = strtoull(value("n"), NULL, 10), m = array("sensors")->n;
@@ -139,12 +146,12 @@ static void answer(int with_gradient) {
 
 int main(void) {
     while (hear()) {
-        if (says("method", "describe")) result("\"protocol\": 1, \"name\": \"bar.c\", \"versions\": {}");
+        if (says("method", "describe")) result("\"protocol\": 1, \"name\": \"executable\", \"versions\": {\"cc\": \"" __VERSION__ "\"}");
         else if (says("method", "load")) load_case();
         else if (says("method", "value")) answer(0);
         else if (says("method", "gradient")) answer(1);
         else if (says("method", "bye")) result("");
-        else error("unsupported", "bar.c does not know this method");
+        else error("unsupported", "it does not know this method");
         if (fflush(stdout) || says("method", "bye")) break;
     }
 }
