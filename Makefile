@@ -11,7 +11,7 @@ CHECKED := adjoint faulty-adjoint
 TESTED ?= tests/test_api.py tests/test_cli.py tests/problems/test_problems.py tests/routes/test_factorization.py
 
 .DEFAULT_GOAL := help
-.PHONY: help demo measured test test-pythons lint type gate baseline adapters benchmark benchmark-regression benchmark-baseline faults mutants reports reference docs vega clean
+.PHONY: help demo measured test test-pythons lint type gate baseline adapters adapters-all benchmark benchmark-regression benchmark-baseline faults mutants reports reference docs vega clean
 
 help: ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 24
@@ -88,8 +88,12 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.error_bars
 	$(BIN)/python -m benchmarks.adapter_overhead
 
-adapters: $(READY) ## environments of Taichi, Warp and torch-fem, with which the tests run their adapters (2.5 GB)
-	$(BIN)/routes environments create taichi warp torch-fem
+adapters: $(READY) ## environments of Taichi, Warp, torch-fem and C, with which the tests run their adapters (2.5 GB)
+	$(BIN)/routes environments create --missing taichi warp torch-fem executable
+
+adapters-all: $(READY) ## environments of all frameworks (9 GB), then their comparison, results/frameworks.md, where it is missing
+	$(BIN)/routes environments create --missing all
+	$(BIN)/python -m benchmarks.frameworks $(if $(AGAIN),--again)
 
 faults: $(READY) ## 300 kills, full disks and read-only stores at random points of sweeps: is anything lost? (half an hour)
 	$(BIN)/python -m benchmarks.faults

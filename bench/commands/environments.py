@@ -26,6 +26,7 @@ def environments(context: click.Context) -> None:
     \b
     routes environments                     which there are, what they weigh
     routes environments create torch-fem    make one, and hold a gradient of it against ours
+    routes environments create --missing all
     """
     from gradient_routes.bench.environments.building import weight
     from gradient_routes.bench.units import size
@@ -40,9 +41,10 @@ def environments(context: click.Context) -> None:
 
 
 @environments.command()
-@click.argument("names", nargs=-1, required=True, metavar="NAME|FILE.py...")
+@click.argument("names", nargs=-1, required=True, metavar="NAME|all|FILE.py...")
+@click.option("--missing", is_flag=True, help="Leave those alone that have been made.")
 @debug_option
-def create(names: tuple[str, ...]) -> None:
+def create(names: tuple[str, ...], missing: bool) -> None:
     """Make the environments of adapters, by uv where it is installed, else by venv and pip.
 
     Packages and versions are those of the adapter's inline metadata. A new environment is held against ours by one
@@ -56,10 +58,13 @@ def create(names: tuple[str, ...]) -> None:
     from gradient_routes.routes.foreign.manifest import manifest, shipped
 
     known = shipped()
+    names = tuple(known) if names == ("all",) else names
     scripts = {name: Path(name).absolute() if name.endswith(".py") else known.get(name) for name in names}
     for name in (name for name, script in scripts.items() if script is None):
         raise InputError(f"no adapter '{name}' - {did_you_mean(name, known)}")
     for found in [manifest(script) for script in scripts.values() if script is not None]:
+        if missing and found.ready:
+            continue
         folder = make(found)
         route = found.name if found.script in known.values() else f"adapter[command={shlex.quote(str(found.script))}]"
         echo(f"{found.name}: {size(weight(folder))} in {folder}, {_compared(route, found)}")

@@ -1,0 +1,36 @@
+"""The comparison of frameworks that is committed: what it asks for, and the page it makes of rows."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import frameworks
+from gradient_routes.bench.cases import case
+from gradient_routes.bench.store.store import Store
+from gradient_routes.routes.foreign.manifest import shipped
+
+ASKED = (*frameworks.ON_BAR, *frameworks.ON_BLOCK, *frameworks.RANKS, *frameworks.DIRECT, *frameworks.OURS)
+BROKEN = Path(__file__).parents[2] / "routes" / "foreign" / "misbehaving.py"
+
+
+def test_it_asks_for_every_adapter_with_options_that_it_has() -> None:
+    assert {spec.name for spec in case.routes(ASKED)} == {*shipped(), *frameworks.OURS}
+
+
+def test_a_row_is_numbers_or_the_reason_why_not(tmp_path: Path, cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, broken = tmp_path / "some.sqlite", f"adapter[command={sys.executable} -IS {BROKEN} exits]"
+    routes = ["--route=adjoint", f"--route={broken}"]
+    cli("run", "--problem=bar[n=4]", *routes, "--no-timing", "--gradient", "--json", f"--store={store}")
+    for name, path in (("STORE", store), ("PAGE", tmp_path / "it.md"), ("TABLE", tmp_path / "it.csv")):
+        monkeypatch.setattr(frameworks, name, path)
+    frameworks.write()
+    lines = (tmp_path / "it.md").read_text().splitlines()
+    (ours,) = (line for line in lines if line.startswith("| adjoint |"))
+    assert ours.endswith("| 0.0e+00 |"), "off itself"
+    assert float(ours.split(" | ")[-2]) < 1e-14
+    (theirs,) = (line for line in lines if line.startswith("| adapter |"))
+    assert "crashed: adapter: ended with exit code 3 in gradient()" in theirs
+    assert len((tmp_path / "it.csv").read_text().splitlines()) == len(Store(store).rows()) + 1
