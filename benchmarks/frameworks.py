@@ -13,15 +13,17 @@ import argparse
 import csv
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
 
+from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.environment import environment
 from gradient_routes.bench.cases.row import measured
@@ -39,7 +41,7 @@ from gradient_routes.routes.newton import Solver
 STORE, PAGE, TABLE = (Path("results/frameworks").with_suffix(suffix) for suffix in (".sqlite", ".md", ".csv"))
 LIMIT_S = 120.0  # for a case: start, compilation, two gradients and their judgement
 BARS, BLOCKS = (8, 100), (4, 8, 12, 16)
-OURS = ("adjoint", "implicit-ad")
+OURS = ["adjoint", "implicit-ad"]
 ON_BAR = (
     "executable jax[strategy=implicit|unrolled] torch[strategy=implicit|unrolled]"
     " lineax[solver=tridiagonal|cg|newton|newton-unrolled] torch-fem[solver=direct|cg] taichi warp-unrolled"
@@ -48,7 +50,7 @@ ON_BLOCK = (
     "jax-fem[tolerances=default|tight] torch-fem[solver=direct|cg] dolfinx[ranks=1]"
     " dolfinx-adjoint feax[tolerances=default|tight] warp"
 ).split()
-RANKS = ("dolfinx[ranks=2]",)  # alone: ranks that wait keep a processor busy
+RANKS = ["dolfinx[ranks=2]"]  # alone: ranks that wait keep a processor busy
 DIRECT = (
     "adjoint adjoint[correct=yes] jax-fem[tolerances=tight] torch-fem[solver=direct] dolfinx dolfinx-adjoint"
     " feax[tolerances=tight] warp"
@@ -60,6 +62,7 @@ COLUMNS = (
     "problem n route status reason name versions J error off_adjoint first_s compile_s forward_s backward_s peak_bytes"
     " tape_bytes memory_by rtol started"
 ).split()
+NAMED = ("strategy", "solver", "tolerances", "ranks", "correct")
 BUSY = 1.5  # wall over CPU time of forward solves
 SECONDS = ("first_s", "compile_s", "forward_s", "backward_s")
 HEAD = ("route", "first call", "compile", "forward", "backward", "peak memory", "tape", "error", "off our adjoint")
@@ -116,7 +119,14 @@ def record(row: Row) -> dict[str, Any]:
         seconds = {"forward_s": row["forward_s"], "backward_s": max(0.0, row["seconds"] - row["forward_s"])}
     of_ours = {"gradient-routes": environment()["versions"]["gradient-routes"]} if row["route"] in OURS else {}
     versions = peer.get("versions") or of_ours
-    found = {"problem": row["problem"], "n": n, "route": label(row), "J": row["objective"], **told, **seconds}
+    found = {
+        "problem": row["problem"],
+        "n": n,
+        "route": label(row["route"], row["route_options"] or {}),
+        "J": row["objective"],
+        **told,
+        **seconds,
+    }
     found |= {"versions": " ".join(f"{name} {of}" for name, of in versions.items()), "memory_by": row["memory_method"]}
     found |= {"name": peer.get("name", "gradient-routes"), "rtol": (row["settings"] or {}).get("rtol", DEFAULT)}
     if measured(row) and row["gradient"] is not None:
@@ -125,12 +135,21 @@ def record(row: Row) -> dict[str, Any]:
     return found
 
 
-def label(row: Row) -> str:
+def label(route: str, options: Mapping[str, Any]) -> str:
     """A route with those of its options that the comparison names."""
-    named = ("strategy", "solver", "tolerances", "ranks", "correct")
-    given = [f"{name}={row['route_options'][name]}" for name in named if name in (row["route_options"] or {})]
-    given = [each for each in given if each != "correct=no"]
-    return row["route"] + (f"[{','.join(given)}]" if given else "")
+    given = [f"{name}={options[name]}" for name in NAMED if options.get(name, "no") != "no"]
+    return route + (f"[{','.join(given)}]" if given else "")
+
+
+def missing(records: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """What has not been measured, as rows that say so."""
+    known = {(each["problem"], each["n"], each["route"]) for each in records}
+    for problem, sizes, routes in (("bar", BARS, OURS + ON_BAR), ("block", BLOCKS, OURS + ON_BLOCK + RANKS)):
+        for n, spec in product(sizes, case.routes(routes)):
+            name = label(spec.name, spec.options)
+            if (problem, n, name) not in known:
+                why = {"status": "not measured", "reason": "run make adapters-all", "rtol": DEFAULT}
+                yield {"problem": problem, "n": n, "route": name, "name": name, "versions": ""} | why
 
 
 def page(records: Sequence[dict[str, Any]], busy: float) -> Iterator[str]:
@@ -141,8 +160,8 @@ def page(records: Sequence[dict[str, Any]], busy: float) -> Iterator[str]:
         "The same problems, J and p in every framework, by `make adapters-all`. One run, one thread each,"
         f" {where['cpu']}, {where['cores']} processors. Every call starts from u = 0. `first call` is cold and may"
         " compile; forward, backward and memory are those of a call after it. Other frameworks measure themselves:"
-        " memory is what a call takes above what its process held before, and MUMPS keeps its own. Our backward time is"
-        " that of the gradient less that of a forward solve.\n"
+        " memory is what a call takes above what its process held before, and MUMPS keeps its own; of ranks it is that"
+        " of the first. Our backward time is that of the gradient less that of a forward solve.\n"
     )
     yield (
         f"Our forward solves took {busy:.1f} times their CPU time in the median"
@@ -189,7 +208,8 @@ def table(head: Sequence[str], rows: Any) -> Iterator[str]:
 def write() -> None:
     """The page and the table of what the store has."""
     rows = list(Store(STORE).latest().values())
-    records = sorted(map(record, rows), key=lambda each: (each["problem"], each["n"]))
+    records = [*map(record, rows)]
+    records = sorted([*records, *missing(records)], key=lambda each: (each["problem"], each["n"]))
     prices = [row["price_s"] / row["price_cpu_s"] for row in rows if row["price_s"] and row["price_cpu_s"]]
     PAGE.write_text("\n".join(page(records, median(prices or [1.0]))))
     with TABLE.open("w", newline="") as file:

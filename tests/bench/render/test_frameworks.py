@@ -28,9 +28,10 @@ def test_a_row_is_numbers_or_the_reason_why_not(tmp_path: Path, cli, monkeypatch
         monkeypatch.setattr(frameworks, name, path)
     frameworks.write()
     lines = (tmp_path / "it.md").read_text().splitlines()
-    (ours,) = (line for line in lines if line.startswith("| adjoint |"))
+    (ours,) = (line for line in lines if line.startswith("| adjoint |") and "not measured" not in line)
     assert ours.endswith("| 0.0e+00 |"), "off itself"
     assert float(ours.split(" | ")[-2]) < 1e-14
+    assert "| dolfinx[ranks=2] | not measured: run make adapters-all | " in "\n".join(lines)
     (theirs,) = (line for line in lines if line.startswith("| adapter |"))
     assert "crashed: adapter: ended with exit code 3 in gradient()" in theirs
-    assert len((tmp_path / "it.csv").read_text().splitlines()) == len(Store(store).rows()) + 1
+    assert len((tmp_path / "it.csv").read_text().splitlines()) > len(Store(store).rows()) + 1

@@ -76,6 +76,8 @@ def gradient(number, n):
         result["gradient"] = array([1.0] * (2 * n), "complex128") | {"complex128": [n]}
     elif KIND == "a-list":
         result["gradient"] = [1.0] * n
+    elif KIND == "warms-up":  # and says the number of its request for seconds
+        result |= {"forward_s": number, "compile_s": number}
     elif KIND == "negative-seconds":
         result["forward_s"] = -1.0
     elif KIND == "nan-residual":

@@ -15,7 +15,7 @@ from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.foreign.foreign import of_manifest
-from gradient_routes.routes.foreign.manifest import environments, manifest, shipped
+from gradient_routes.routes.foreign.manifest import Manifest, environments, manifest, shipped
 
 SCRIPT = Path(__file__).parent / "bar_adapter.py"
 
@@ -123,6 +123,24 @@ def test_a_program_in_C_is_compiled(cli, monkeypatch: pytest.MonkeyPatch) -> Non
     ran = cli("environments", "create", "executable")
     says = "executable: no C compiler no-such here - install one, or name it in CC"
     assert (ran.code, ran.err, found.ready) == (1, f"routes: {says}\n", False)
+
+
+def test_those_that_are_made_may_be_left_alone(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    def create(found: Manifest) -> Path:
+        made.append(found.name)
+        raise building.NotInstalled(f"{found.name}: no network")
+
+    monkeypatch.setattr(building, "create", create)
+    for name in ("dolfinx-adjoint", "jax"):
+        mark = manifest(shipped()[name]).mark
+        mark.parent.mkdir(parents=True)
+        mark.touch()
+    assert cli(*"environments create --missing jax torch".split()).err == "routes: torch: no network\n"
+    assert cli(*"environments create --missing all".split()).code == 1
+    assert cli(*"environments create jax".split()).code == 1
+    assert made == ["torch", "dolfinx", "jax"]
 
 
 def test_a_failed_environment_is_not_ready(monkeypatch: pytest.MonkeyPatch, cli) -> None:

@@ -99,6 +99,12 @@ def test_what_another_code_says_of_itself_is_kept(rows: dict) -> None:
     assert rows["another-J"]["memory_method"] == "by another-J itself"
 
 
+def test_its_compilation_is_that_of_the_first_call_its_times_are_those_of_the_second(cli) -> None:
+    (row,) = cli(*"run --problem bar --no-store --json --no-timing --route".split(), route("warms-up")).rows
+    asked_before = 2  # describe and load
+    assert (row["peer"]["compile_s"], row["peer"]["forward_s"]) == (asked_before + 1, asked_before + 2)
+
+
 def test_a_gradient_that_is_wrong_for_our_J_is_warned_of(cli) -> None:
     ran = cli(*"run --problem bar --no-store --json --no-timing --route".split(), route("wrong"))
     (row,) = ran.rows
