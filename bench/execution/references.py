@@ -22,6 +22,7 @@ DIRECTIONS, SEED = 3, 20260  # no direction a user's --seed would name
 SAME = 1e-6  # of J: no tolerance of a forward solve, another state
 CANCELLED = 1e3  # eps, what condition numbers make of rounding in the terms of a gradient
 RTOL = 1e-13  # forward solves of judges in directions
+POLISH = 1  # Newton steps of judges beyond the judged: one at 1e-12 would leave 1e-12 of the gradient, as they do
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class Judges:
         if reason is not None:
             return reason if route.name in reason else f"{route.name}: {reason}"
         if whole:
-            J, gradient, *_ = route.prepare(self.model, self.p)(self.p)
+            J, gradient, *_ = route.prepare(self._polished, self.p)(self.p)
             if self._another_state(J):
                 return f"{route.name}: has found another state, J = {J:.6g} and not {self._J:.6g}"
             sizes = problem.parameters.natural(self.p)
@@ -123,15 +124,19 @@ class Judges:
         return max(abs(self._J), abs(float(before)))
 
     @cached_property
+    def _polished(self) -> Model:
+        return Model(self.model.problem, replace(self.model.solver, polish=POLISH))
+
+    @cached_property
     def _J(self) -> float:
-        return Model(self.model.problem, self.model.solver).value(self.p)  # whose factors are released
+        return Model(self.model.problem, self._polished.solver).value(self.p)  # whose factors are released
 
     def _another_state(self, J: float | None) -> bool:
         """Whether a judge's J is not the J of real solves: where R(u, p) = 0 has several solutions it may be."""
         return J is not None and abs(J - self._J) > SAME * self.terms
 
     def _slopes(self, route: Route, few: Subspace) -> Array:
-        solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol))
+        solver = replace(self.model.solver, rtol=min(RTOL, self.model.solver.rtol), polish=POLISH)
         if route.name == "complex-step":
             return complex_slopes(Model(self.model.problem, solver), self.p, np.asarray(few.V))
         c = few.parameters.start
