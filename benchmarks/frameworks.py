@@ -62,6 +62,8 @@ COLUMNS = (
     "problem n route status reason name versions J error off_adjoint first_s compile_s forward_s backward_s peak_bytes"
     " tape_bytes memory_by rtol started"
 ).split()
+KEY = ("problem", "n", "route", "rtol")
+NOT_MEASURED = {"status": "not measured", "reason": "run make adapters-all"}
 NAMED = ("strategy", "solver", "tolerances", "ranks", "correct")
 BUSY = 1.5  # wall over CPU time of forward solves
 SECONDS = ("first_s", "compile_s", "forward_s", "backward_s")
@@ -116,7 +118,9 @@ def record(row: Row) -> dict[str, Any]:
     told = {name: row[name] for name in ("status", "reason", "first_s", "peak_bytes", "tape_bytes", "started")}
     seconds = {name: peer.get(name) for name in PHASES}
     if row["seconds"] is not None:  # timed by us
-        seconds = {"forward_s": row["forward_s"], "backward_s": max(0.0, row["seconds"] - row["forward_s"])}
+        seconds = {"forward_s": row["forward_s"]}
+    if row["forward_ratio"] is not None:
+        seconds["backward_s"] = row["forward_s"] * (row["forward_ratio"] - 1.0)
     of_ours = {"gradient-routes": environment()["versions"]["gradient-routes"]} if row["route"] in OURS else {}
     versions = peer.get("versions") or of_ours
     found = {
@@ -141,15 +145,14 @@ def label(route: str, options: Mapping[str, Any]) -> str:
     return route + (f"[{','.join(given)}]" if given else "")
 
 
-def missing(records: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """What has not been measured, as rows that say so."""
-    known = {(each["problem"], each["n"], each["route"]) for each in records}
+def in_order(records: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """As they are asked for, with a row for what has not been measured; then the others."""
+    known = {tuple(each[name] for name in KEY): each for each in records}
     for problem, sizes, routes in (("bar", BARS, OURS + ON_BAR), ("block", BLOCKS, OURS + ON_BLOCK + RANKS)):
         for n, spec in product(sizes, case.routes(routes)):
-            name = label(spec.name, spec.options)
-            if (problem, n, name) not in known:
-                why = {"status": "not measured", "reason": "run make adapters-all", "rtol": DEFAULT}
-                yield {"problem": problem, "n": n, "route": name, "name": name, "versions": ""} | why
+            key = (problem, n, label(spec.name, spec.options), DEFAULT)
+            yield known.pop(key, dict(zip(KEY, key, strict=True)) | NOT_MEASURED)
+    yield from known.values()
 
 
 def page(records: Sequence[dict[str, Any]], busy: float) -> Iterator[str]:
@@ -161,7 +164,8 @@ def page(records: Sequence[dict[str, Any]], busy: float) -> Iterator[str]:
         f" {where['cpu']}, {where['cores']} processors. Every call starts from u = 0. `first call` is cold and may"
         " compile; forward, backward and memory are those of a call after it. Other frameworks measure themselves:"
         " memory is what a call takes above what its process held before, and MUMPS keeps its own; of ranks it is that"
-        " of the first. Our backward time is that of the gradient less that of a forward solve.\n"
+        " of the first. Our backward time is that of the gradient less that of a forward solve, where both can be told"
+        " apart.\n"
     )
     yield (
         f"Our forward solves took {busy:.1f} times their CPU time in the median"
@@ -180,7 +184,7 @@ def page(records: Sequence[dict[str, Any]], busy: float) -> Iterator[str]:
     yield f"## Direct solvers at `--rtol {TIGHT:g}`, block, n = {BLOCKS[0]}\n"
     yield from table(("route", "error"), ((each["route"], short(each.get("error"))) for each in tight))
     yield "## Versions\n"
-    about = {each["name"]: each["versions"] for each in records if each["versions"]}
+    about = {each["name"]: each["versions"] for each in records if each.get("versions")}
     yield from table(("measured by", "versions"), sorted(about.items()))
     yield "## Not measured\n"
     yield from table(("what", "why"), ABSENT.items())
@@ -208,8 +212,7 @@ def table(head: Sequence[str], rows: Any) -> Iterator[str]:
 def write() -> None:
     """The page and the table of what the store has."""
     rows = list(Store(STORE).latest().values())
-    records = [*map(record, rows)]
-    records = sorted([*records, *missing(records)], key=lambda each: (each["problem"], each["n"]))
+    records = [*in_order([*map(record, rows)])]
     prices = [row["price_s"] / row["price_cpu_s"] for row in rows if row["price_s"] and row["price_cpu_s"]]
     PAGE.write_text("\n".join(page(records, median(prices or [1.0]))))
     with TABLE.open("w", newline="") as file:
