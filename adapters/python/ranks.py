@@ -1,8 +1,9 @@
 """An adapter that runs on several processes of MPI: rank 0 speaks the protocol, all do what it is asked."""
 
+import os
 import traceback
 
-from routes_adapter import Refusal, serve
+from routes_adapter import Refusal, connect, serve
 
 
 class _Together:
@@ -22,6 +23,8 @@ class _Together:
 def serve_on_ranks(adapter, comm, name, **about):
     """See `serve`. A Refusal has to occur on all ranks; another error on one of the others ends all."""
     if comm.rank == 0:
+        if "ROUTES_ADAPTER" in os.environ:
+            connect(os.environ["ROUTES_ADAPTER"])
         try:
             serve(_Together(adapter, comm), name, **about)
         finally:

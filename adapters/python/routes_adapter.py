@@ -56,6 +56,12 @@ class Unsupported(Refusal):
 KINDS = {MemoryError: "memory", np.linalg.LinAlgError: "singular"}
 
 
+def connect(folder):
+    """Speak by the descriptors 3 and 4 of the process whose folder of descriptors this is, not by stdin and stdout."""
+    global _IN, _OUT
+    _IN, _OUT = open(f"{folder}/3", "rb"), open(f"{folder}/4", "wb")  # noqa: SIM115 - as long as it serves
+
+
 def serve(adapter, name, versions=(), kinds=None, **about):
     """Answers until `bye` or the end of input.
 

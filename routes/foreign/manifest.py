@@ -37,6 +37,8 @@ START = """import runpy, sys
 sys.path[0] = sys.argv[1]
 import routes_adapter  # before the framework: what is printed goes to stderr from then on
 runpy.run_path(sys.argv[2], run_name="__main__")"""
+# MPICH's mpiexec ends where a rank reads stdin slower than it is written, and writes to stdout itself
+AROUND = 'exec 3<&0 4>&1; export ROUTES_ADAPTER=/proc/$$/fd; exec "$@" </dev/null >&2'
 BLOCK = re.compile(r"(?m)^# /// script$\s(?P<content>(^#(| .*)$\s)+)^# ///$")  # PEP 723's own expression
 
 
@@ -89,7 +91,7 @@ class Manifest:
         words = [word.format(**options) for word in self.launch]
         if words == [word.format(**self.defaults) for word in self.launch]:
             return program
-        return str(self.python.with_name(words[0])), *words[1:], *program
+        return "sh", "-c", AROUND, "sh", str(self.python.with_name(words[0])), *words[1:], *program
 
     @property
     def ready(self) -> bool:
