@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Software:  mpich 5.0.2, the wheel of PyPI, whose mpiexec is Hydra, Python 3.11 and 3.12
+# Software:  mpich 5.0.2, the wheel of PyPI, whose mpiexec is Hydra, Python 3.12
 # Behaviour: mpiexec passes stdin to rank 0 without flow control. Where more than a pipe holds, 64 KiB, comes before
 #            the rank has read it, the proxy ends with "process reading stdin too slowly; can't keep up" and the run
 #            with it: whether a program lives depends on the load of the machine.
