@@ -40,7 +40,7 @@ from gradient_routes.routes.newton import Solver
 
 STORE, PAGE, TABLE = (Path("results/frameworks").with_suffix(suffix) for suffix in (".sqlite", ".md", ".csv"))
 LIMIT_S = 120.0  # for a case: start, compilation, two gradients and their judgement
-BARS, BLOCKS = (8, 100), (4, 8, 12, 16)
+BARS, BLOCKS = (100,), (4, 8, 12, 16)
 OURS = ["adjoint", "implicit-ad"]
 ON_BAR = (
     "executable jax[strategy=implicit|unrolled] torch[strategy=implicit|unrolled]"
