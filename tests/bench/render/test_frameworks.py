@@ -12,7 +12,14 @@ from gradient_routes.bench.cases import case
 from gradient_routes.bench.store.store import Store
 from gradient_routes.routes.foreign.manifest import shipped
 
-ASKED = (*frameworks.ON_BAR, *frameworks.ON_BLOCK, *frameworks.RANKS, *frameworks.DIRECT, *frameworks.OURS)
+ASKED = (
+    *frameworks.ON_BAR,
+    *frameworks.ON_BLOCK,
+    *frameworks.RANKS,
+    *frameworks.FAST,
+    *frameworks.SLOW,
+    *frameworks.OURS,
+)
 BROKEN = Path(__file__).parents[2] / "routes" / "foreign" / "misbehaving.py"
 
 
