@@ -41,7 +41,9 @@ class Plate(Solid):
         self,
         *,
         kind: Annotated[options.Kind, "of state; axisymmetric: about x = 0"] = "plane-stress",
-        body: Annotated[Literal["rectangle", "hole", "quarter"], "hole: in its middle; quarter: of such"] = "rectangle",
+        body: Annotated[
+            Literal["rectangle", "hole", "quarter"], "with a hole in its middle, a quarter of that"
+        ] = "rectangle",
         n: options.Count = 4,
         nx: options.Along = None,
         ny: options.Along = None,
