@@ -1,6 +1,6 @@
-"""The bar: N two-node elements, fixed at x = 0, loaded at x = L, with one modulus per element.
+"""The bar: N two-node elements, fixed at x = 0, loaded along its length and at x = L, with one modulus per element.
 
-K(E) u = f,    k_e = E_e A / L_e [[1, -1], [-1, 1]],    f = F at node N,    K = B^T diag(E A / L_e) B
+K(E) u = f,    k_e = E_e A / L_e [[1, -1], [-1, 1]],    f_i = q L_e (node N: F + q L_e/2),    K = B^T diag(E A / L_e) B
 
 An optional stop beyond the tip (problems/contact.py) makes the problem nonlinear and nonsmooth.
 """
@@ -18,7 +18,7 @@ from gradient_routes.problems.contact import GAP, K_C, STOP_WIDTH, Stop, StopNam
 from gradient_routes.problems.data.observation import Candidates, Observation, selection
 from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
 from gradient_routes.problems.data.sensors import Nodes, Sensors, parse_nodes, read_sensors
-from gradient_routes.problems.data.units import standard_deviation
+from gradient_routes.problems.data.units import Kind, quantity, standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.tridiagonal import (
     BorderedTridiagonal,
@@ -39,15 +39,15 @@ from gradient_routes.problems.problem import (
     Traced,
 )
 
-L, A, F = 1.0, 1.0, 1.0  # length [m], cross-section [m^2], end load [N]
 THETA_MAX = 170.0  # E = exp(theta) < 1e74: E^2 and E^3 in J and dJ/dE stay in float64's range
 N_MAX = 10**7  # a gradient takes 1 GB
+LEAST, MOST = 1e-30, 1e30  # of lengths, areas, loads and the start of E
 
 
 def true_modulus(x: Array) -> Array:
-    """The modulus [Pa] that synthetic data are computed from: a smooth field with a soft inclusion at x = 0.35.
+    """The modulus [E_0] at x [L] that synthetic data are computed from: a smooth field with a soft inclusion at 0.35.
 
-    It differs from the start E = 1 near the clamp, where the misfit would otherwise be all rounding.
+    It differs from the start E_0 near the clamp, where the misfit would otherwise be all rounding.
     """
     return (1.3 + 0.2 * np.sin(2.0 * np.pi * x)) * (1.0 - 0.5 * np.exp(-(((x - 0.35) / 0.1) ** 2)))
 
@@ -73,7 +73,13 @@ class Bar(Problem):
         n: Annotated[int, "number of elements N"] = 8,
         sensors: Annotated[Nodes | None, "5: nodes 1 to 5; 1,3,5 or 2..6 or 5..5: these; 0: none [the first 5]"] = None,
         parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
-        modulus: Annotated[float | None, "E of the start [Pa] [1; fitted to the data of a file]"] = None,
+        modulus: Annotated[
+            float | None, "E of the start [Pa]; synthetic data: of 0.7 to 1.5 E [1; fitted to a file]"
+        ] = None,
+        length: Annotated[float | str, "L [m], or 250mm"] = 1.0,
+        area: Annotated[float, "cross-section A [m2]"] = 1.0,
+        force: Annotated[float | str, "F at the end [N], or 5kN"] = 1.0,
+        distributed: Annotated[float, "load q along the bar [N/m]"] = 0.0,
         data: Annotated[str | None, "file of measurements, columns node,displacement [synthetic]"] = None,
         columns: Annotated[str | None, "of the file, node:NAME,displacement:NAME [by its header]"] = None,
         units: Annotated[str | None, "of the file's displacement, such as mm [the header's, else m]"] = None,
@@ -94,18 +100,21 @@ class Bar(Problem):
         check_applies("bar", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != PHI_WIDTH}))
         self.regularization = Prior(alpha, phi, phi_width)
         self.regularization.check("bar")
-        if modulus is not None and not 1e-30 <= modulus <= 1e30:
-            raise InputError(f"bar: modulus={modulus:g} Pa - choose one from 1e-30 to 1e30")
+        self.E_0 = E = 1.0 if modulus is None else _size("modulus", modulus)
         check_applies("bar", ("data=FILE", data is not None, True, {"columns": columns, "units": units}))
         sigma = standard_deviation(noise, data is not None, "bar")
         if seed < 0:
             raise InputError(f"bar: seed={seed} - choose seed >= 0")
+        self.L, self.A = _size("length", length, "length"), _size("area", area)
+        self.F, self.q = _load("force", force, "force"), _load("distributed", distributed)
+        if self.F == self.q == 0.0:
+            raise InputError("bar: force=0 and distributed=0 move nothing - give one of them")
         self.n, self.n_state, self.structure = n, n, "spd"
         self._set_stop(make_stop(stop, gap, k_c, width, "bar"))
         self.log = parametrization == "log"
-        self.L_e = L / n
-        self.f = np.zeros(n)  # [N]
-        self.f[-1] = F
+        self.L_e = self.L / n
+        self.f = np.full(n, self.q * self.L_e)  # [N]
+        self.f[-1] = self.F + self.q * self.L_e / 2.0
         self.x = (np.arange(n) + 0.5) * self.L_e  # element centres [m]
         self.synthetic, self.noise = data is None, sigma
         if data is not None:
@@ -113,10 +122,9 @@ class Bar(Problem):
             self.sensors, self.noise, self.read_as = measured.sensors, measured.sigma, measured.notes
         else:
             nodes = parse_nodes(min(5, n) if sensors is None else sensors, n, "bar")
-            S = cumulative_sum(self.L_e / (A * true_modulus(self.x)))
-            d = (self._tip_load(S[-1])[0] * S)[nodes - 1]
+            N, s, _ = self._axial_forces(E * true_modulus(self.x / self.L))
+            d = cumulative_sum(s * N)[nodes - 1]
             self.sensors = Sensors(nodes, d + sigma * np.random.default_rng(seed).standard_normal(len(nodes)))
-        E = 1.0 if modulus is None else modulus
         self.measured = data is not None
         self.start_from_data = data is not None and modulus is None
         self.parameters = Parameters(
@@ -166,7 +174,10 @@ class Bar(Problem):
         """Every element split in two, the same data at the same points; None if too many elements."""
         if 2 * self.n > N_MAX:
             return None
-        finer = Bar(n=2 * self.n, sensors=0, parametrization="log" if self.log else "raw", alpha=self.alpha)
+        finer = Bar(
+            n=2 * self.n, sensors=0, parametrization="log" if self.log else "raw", alpha=self.alpha,
+            modulus=self.E_0, length=self.L, area=self.A, force=self.F, distributed=self.q,
+        )  # fmt: skip
         finer.regularization = self.regularization
         finer.sensors, finer.synthetic = Sensors(2 * self.sensors.nodes, self.sensors.d), self.synthetic
         finer._set_stop(self.stop)
@@ -185,17 +196,19 @@ class Bar(Problem):
             notes += [f"gap={stop.gap:g} < 0: the stop presses on the tip of the unloaded bar"]
         return (*notes, *self.read_as)
 
-    def _tip_load(self, C: Any) -> tuple[Any, Any]:
-        """T = F - q, the axial force of a bar of compliance C [m/N] in equilibrium with the stop, and dT/dC."""
+    def _axial_forces(self, E: Array) -> tuple[Array, Array, Any]:
+        """N (n,) [N] of the elements, in equilibrium with the stop; compliances s = L_e / (A E), (n,) [m/N]; kappa.
+
+        N_e = T + q (L - x_e), with T = F less the force of the stop, which meets a bar of compliance C = sum s.
+        """
+        s, G = self.L_e / (self.A * E), self.q * (self.L - self.x)
         if self.stop is None:
-            return F, 0.0
-        g_0, gap = F * C - self.stop.gap, self.stop.gap
-        g, q, kappa = self.stop.equilibrium(g_0, C)
-        balance = (F + q) * abs(g + gap) <= (abs(g) + abs(gap)) * abs(
-            F - q
-        )  # choose the formula with less cancellation
-        T = F - q if balance else (g + gap) / C
-        return T, -kappa * T
+            return self.F + G, s, 0.0
+        F, gap, C, u_G = self.F, self.stop.gap, cumulative_sum(s)[-1], cumulative_sum(s * G)[-1]
+        g, q, kappa = self.stop.equilibrium(F * C + u_G - gap, C)
+        moved = g + gap - u_G  # T C: choose the formula of T with less cancellation
+        balance = (abs(F) + q) * abs(moved) <= (abs(g) + abs(gap) + abs(u_G)) * abs(F - q)
+        return (F - q if balance else moved / C) + G, s, kappa
 
     def modulus(self, p: Any, xp: Any = np) -> Any:
         """E(p), (N,) [Pa]."""
@@ -206,7 +219,7 @@ class Bar(Problem):
 
     def stiffness(self, p: Any, xp: Any = np) -> Any:
         """Spring constants D = E A / L_e, (N,) [N/m]."""
-        return self.modulus(p, xp) * (A / self.L_e)
+        return self.modulus(p, xp) * (self.A / self.L_e)
 
     def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
         """R = B^T D B u - f, (N,) [N], plus the contribution of the stop."""
@@ -228,7 +241,7 @@ class Bar(Problem):
 
     def linearize(self, u: Array, p: Array) -> Linearization:
         """R_p = B^T diag(dD/dp B u), J_u = S^T (S u - d), J_p = alpha Phi'."""
-        dD_dp = self.stiffness(p) if self.log else np.full_like(p, A / self.L_e)
+        dD_dp = self.stiffness(p) if self.log else np.full_like(p, self.A / self.L_e)
         J_p = np.zeros_like(p)
         if self.alpha:
             by_theta = self.regularization.gradient(self.log_modulus(p))
@@ -283,43 +296,42 @@ class Bar(Problem):
         return largest * xp.sum((rows / largest) ** q) ** (1.0 / q)
 
     def reference(self, p: Array) -> Reference:
-        """Closed form: u_k = T S_k with the compliances s_e = L_e / (A E_e), their sums S_k = sum_{e <= k} s_e and the
-        axial force T(C), C = S_N, in equilibrium with the stop; T' = dT/dC. Hence
+        """Closed form: u_k = sum_{e <= k} s_e N_e with the compliances s_e = L_e / (A E_e) and the axial forces N_e in
+        equilibrium with the stop, dN_i/ds_e = -kappa N_e for all i. With S_k = sum_{e <= k} s_e and r = u - d,
 
-        dJ/dE_e = - s_e / E_e (T sum_{sensors k >= e} r_k + T' sum_{sensors k} r_k S_k) + alpha dPhi/dE_e,  r = u - d
+        dJ/dE_e = - s_e N_e / E_e (sum_{sensors k >= e} r_k - kappa sum_{sensors k} r_k S_k) + alpha dPhi/dE_e
 
         Summed in extended precision where the platform has it (x86).
         """
         E = self.modulus(p.astype(np.longdouble))
-        s = np.longdouble(self.L_e) / (A * E)
-        S = np.cumsum(s)
-        T, dT_dC = self._tip_load(S[-1])
+        N, s, kappa = self._axial_forces(E)
+        S, u = np.cumsum(s), np.cumsum(s * N)
         at, d = self.sensors.nodes - 1, self.sensors.d
         r, size = np.zeros((2, self.n), np.longdouble)
-        r[at], size[at] = T * S[at] - d, abs(T * S[at]) + abs(d)
+        r[at], size[at] = u[at] - d, abs(u[at]) + abs(d)
         seen_r, seen_size = np.cumsum(r[::-1])[::-1], np.cumsum(size[::-1])[::-1]
         by_prior = self.regularization.gradient(np.log(E))
-        dJ_dtheta = -s * (T * seen_r + dT_dC * (r @ S)) + by_prior
+        dJ_dtheta = -s * N * (seen_r - kappa * (r @ S)) + by_prior
         chain_rule = 1.0 if self.log else 1.0 / E
-        terms = (s * (abs(T) * seen_size + abs(dT_dC) * (size @ S)) + abs(by_prior)) * chain_rule
+        terms = (s * abs(N) * (seen_size + abs(kappa) * (size @ S)) + abs(by_prior)) * chain_rule
         return Reference("closed form", np.asarray(dJ_dtheta * chain_rule, float), float(np.sqrt(np.sum(terms**2))))
 
     def truth(self) -> Array | None:
         if not self.synthetic:
             return None
-        E = true_modulus(self.x)
+        E = self.E_0 * true_modulus(self.x / self.L)
         return np.log(E) if self.log else E
 
     def case(self) -> dict[str, Any]:
-        if self.stop is not None or self.alpha:
-            what = f"alpha={self.alpha:g}" if self.stop is None else "a stop"
+        if self.stop is not None or self.alpha or self.q:
+            what = "a stop" if self.stop else f"alpha={self.alpha:g}" if self.alpha else f"distributed={self.q:g}"
             raise NotOffered(f"bar: {what} is not described to other codes - leave it out")
         return {
             "kind": "bar",
             "n": self.n,
-            "length": L,
-            "area": A,
-            "load": F,
+            "length": self.L,
+            "area": self.A,
+            "load": self.F,
             "sensors": self.sensors.nodes,
             "data": self.sensors.d,
             "parametrization": "log" if self.log else "raw",
@@ -339,8 +351,22 @@ class Bar(Problem):
         columns = {"x": self.x, "E": self.modulus(p), "eps[u]": eps}
         if lam is not None:
             eps_lam = difference(lam[: self.n]) / self.L_e
-            columns |= {"eps[lam]": eps_lam, "A L_e eps eps": A * self.L_e * eps * eps_lam}
+            columns |= {"eps[lam]": eps_lam, "A L_e eps eps": self.A * self.L_e * eps * eps_lam}
         mark = "blind, alpha Phi only" if self.alpha else "blind"
         behind = np.arange(self.n) >= self.last_sensor
         in_contact = self.stop is not None and self.stop.in_contact(u)
         return ParameterView(columns, behind & (not in_contact), mark)
+
+
+def _size(name: str, value: float | str, kind: Kind = "number") -> float:
+    size = quantity(value, kind, f"bar: {name}={value}")
+    if not LEAST <= size <= MOST:
+        raise InputError(f"bar: {name}={value} - choose one from {LEAST:g} to {MOST:g}")
+    return size
+
+
+def _load(name: str, value: float | str, kind: Kind = "number") -> float:
+    load = quantity(value, kind, f"bar: {name}={value}")
+    if load and not LEAST <= abs(load) <= MOST:
+        raise InputError(f"bar: {name}={value} - choose one of a size from {LEAST:g} to {MOST:g}")
+    return load

@@ -10,13 +10,25 @@ from conftest import relative_error, somewhere, zoo
 
 from gradient_routes.problems.bar import Bar, true_modulus
 from gradient_routes.problems.block import Block
-from gradient_routes.problems.errors import DomainError, InputError
+from gradient_routes.problems.errors import DomainError, InputError, NotOffered
 from gradient_routes.problems.jax64 import jax
 from gradient_routes.problems.problem import Offers, Problem, offer_names
+from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.route import Route
+from gradient_routes.routes.tangent import tangent
 
 ZOO = zoo()
 everywhere = pytest.mark.parametrize("name", ZOO)
+REAL = {"length": "400mm", "area": 0.5, "force": "7e-4kN", "distributed": 0.9}
+LOADED = {
+    "bar[real]": Bar(n=6, sensors=[2, 5, 6], **REAL),
+    "bar[real,penalty]": Bar(n=3, sensors=2, stop="penalty", gap=0.1, alpha=0.1, parametrization="raw", **REAL),
+    "bar[real,softplus]": Bar(n=3, sensors=3, stop="softplus", width=0.1, gap=0.3, **REAL),
+    "bar[real,multiplier]": Bar(n=4, sensors=4, stop="multiplier", gap=-0.2, **REAL | {"force": "-0.3N"}),
+}
+BARS = {name: problem for name, problem in ZOO.items() if name.startswith("bar")} | LOADED
 
 
 def point(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -118,10 +130,10 @@ def test_traced_diagonal_and_bound_hold_for_the_matrix() -> None:
     )
 
 
-@pytest.mark.parametrize("name", [n for n in ZOO if n.startswith("bar")])
+@pytest.mark.parametrize("name", BARS)
 def test_closed_form_equals_dense_algebra(name: str) -> None:
     """dJ/dp_i = J_p_i - J_u R_u^{-1} dK/dp_i u with dense matrices: neither a route nor a cumulative sum."""
-    bar = ZOO[name]
+    bar = BARS[name]
     p = somewhere(bar)
     n, u = bar.n, np.zeros(bar.n_state)
     for _ in range(1 if bar.linear else 30):  # a smoothed kink is met from one side, and slowly at first
@@ -133,12 +145,40 @@ def test_closed_form_equals_dense_algebra(name: str) -> None:
     for node, d in zip(bar.sensors.nodes, bar.sensors.d, strict=True):
         J_u[node - 1] = u[node - 1] - d
     lam = np.linalg.solve(R_u.T, -J_u)[:n]  # R_u is that of the last iterate but one: they agree by now
-    g = np.array([lam @ (n * dE[e] * np.outer(B[e], B[e]) @ u[:n]) for e in range(n)])
+    g = np.array([lam @ (bar.A / bar.L_e * dE[e] * np.outer(B[e], B[e]) @ u[:n]) for e in range(n)])
     D = np.diff(np.eye(n), axis=0)
     g += bar.alpha * (D.T @ D @ np.log(E)) * dE / E
     reference = bar.reference(p)
     assert relative_error(reference.gradient, g) < 1e-11  # cond(R_u) eps of the dense solves
     assert reference.size >= np.linalg.norm(reference.gradient) * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("name", LOADED)
+def test_synthetic_data_of_a_loaded_bar_are_those_of_its_equations(name: str) -> None:
+    """J = 0 at the truth; the data of the zoo's bars are as in test_synthetic_data_are_those_of_the_truth."""
+    bar = LOADED[name].weighted(0.0)
+    truth = bar.truth()
+    assert truth is not None
+    assert Model(bar).value(truth) < 1e-24 * (bar.sensors.d @ bar.sensors.d)
+
+
+@pytest.mark.parametrize("name", LOADED)
+@pytest.mark.parametrize("route", [tangent, adjoint, complex_step], ids=lambda route: route.name)
+def test_routes_give_the_closed_form_of_a_loaded_bar(route: Route, name: str) -> None:
+    p = somewhere(LOADED[name])
+    assert relative_error(route.prepare(Model(LOADED[name]), p)(p).gradient, LOADED[name].reference(p).gradient) < 1e-12
+
+
+def test_a_steel_bar_in_real_units_stretches_as_the_closed_form() -> None:
+    """E A u = F x + q (L x - x^2/2)."""
+    bar = Bar(n=5, length="250mm", area=1e-4, force="5kN", distributed=2e3, modulus=2.1e11, sensors=0)
+    x = np.arange(1, 6) * 0.05
+    u = (5e3 * x + 2e3 * (0.25 * x - x**2 / 2.0)) / (2.1e11 * 1e-4)
+    np.testing.assert_allclose(Model(bar).solve(bar.parameters.start).u, u, rtol=1e-14)
+    case = Bar(length=0.25, area=1e-4, force="5kN").case()
+    assert [case[key] for key in ("length", "area", "load")] == [0.25, 1e-4, 5e3]
+    with pytest.raises(NotOffered, match=r"distributed=2000 is not described"):
+        bar.case()
 
 
 def test_the_size_of_a_closed_form_is_that_of_its_terms() -> None:
@@ -150,10 +190,10 @@ def test_the_size_of_a_closed_form_is_that_of_its_terms() -> None:
     assert reference.size == pytest.approx(s * (s + d), rel=1e-14)
 
 
-@pytest.mark.parametrize("name", [n for n in ZOO if n.startswith("bar")])
+@pytest.mark.parametrize("name", BARS)
 def test_a_bar_of_twice_as_many_elements_is_the_same_bar(name: str) -> None:
     """Constant in every element, its moduli give the same displacements at the same places."""
-    bar = ZOO[name]
+    bar = BARS[name]
     p = somewhere(bar)
     finer, q = bar.refined(p)
     assert (finer.n, len(q)) == (2 * bar.n, 2 * len(p))
@@ -242,6 +282,12 @@ def test_sensor_sets(text, nodes: list[int]) -> None:
         ({"data": "nowhere.csv"}, "No such file"),
         ({"data": "nowhere.csv", "noise": 0.0}, "> 0, or leave it out"),
         ({"units": "mm"}, "units needs data=FILE"),
+        ({"length": "0mm"}, "length=0mm - choose one from 1e-30"),
+        ({"length": "3kN"}, "'kN' is a unit of force, not of length"),
+        ({"area": -1.0}, "area=-1"),
+        ({"force": "inf"}, "not a finite number"),
+        ({"force": 0.0}, "force=0 and distributed=0 move nothing"),
+        ({"distributed": 1e40}, "distributed=1e+40"),
     ],
 )
 def test_bad_options_of_the_bar_are_one_line(options: dict, says: str) -> None:
