@@ -41,11 +41,13 @@ from gradient_routes.problems.advection import Advection
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.problems.rod import Rod
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.finite_difference import fd_central, fd_one_sided
 from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.route import Route
+from gradient_routes.routes.synthetic_data import with_synthetic_data
 from gradient_routes.routes.tangent import tangent
 from gradient_routes.routes.unrolled_ad import unrolled_ad
 
@@ -90,8 +92,9 @@ def zoo() -> dict[str, Problem]:
     """Every registered kind of problem, in small variants."""
     bars = {name: Bar(**options) for name, options in BARS.items()}
     advections = {name: Advection(**options) for name, options in ADVECTIONS.items()}
+    rod = with_synthetic_data(Rod(n=4, parts=2, unknown="film+flux", alpha=0.1, tip="convective", sensors=3))
     follower = Block(nx=1, ny=1, nz=2, parametrization="raw", derivatives="hand", load="follower", cases=2)
-    return bars | advections | {"duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower}
+    return bars | advections | {"rod": rod, "duffing": Duffing(), "block[n=2]": Block(n=2), "block[follower]": follower}
 
 
 def options_of(route: Route, problem: Problem) -> list[dict[str, Any]]:

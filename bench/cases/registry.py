@@ -134,6 +134,7 @@ ORDER = (
     "bar",
     "block",
     "plate",
+    "rod",
     "advection",
     "fd-one-sided",
     "fd-central",

@@ -132,7 +132,7 @@ def read_sensors(
         row, value = odd[0] + 1, node[odd[0]]
         raise InputError(f"{path}: data row {row} is of node {value:g}, {who} has nodes 1..{n} - correct the row")
     keep, repeated = without_repeats(path, node[:, None], d[:, None], table.lines, what="node")
-    sigma = _level(table, noise, who)
+    sigma = level(table, noise, who)
     notes = tuple(filter(None, (table.said, repeated, doubt(sigma, float(np.abs(d).max())))))
     node, d = node[keep].astype(np.int64), d[keep]
     if nodes is None:
@@ -145,8 +145,8 @@ def read_sensors(
     return Measured(Sensors(chosen, d[[at[int(k)] for k in chosen]]), sigma, notes)
 
 
-def _level(table: Table, noise: float, who: str) -> float:
-    """The noise of all data [m], 0 if unknown. Raises InputError."""
+def level(table: Table, noise: float, who: str, unit: str = "m") -> float:
+    """The noise of all data, 0 if unknown: `noise`, or the column sigma. Raises InputError."""
     sigma = table.columns.get("sigma")
     if sigma is None:
         return noise
@@ -155,10 +155,10 @@ def _level(table: Table, noise: float, who: str) -> float:
     if not sigma.min() > 0.0:
         bad = int(sigma.argmin())
         raise InputError(
-            f"{table.path}: line {table.lines[bad]}: sigma is {sigma[bad]:g} m - give a standard deviation > 0"
+            f"{table.path}: line {table.lines[bad]}: sigma is {sigma[bad]:g} {unit} - give a standard deviation > 0"
         )
     if np.ptp(sigma) > 1e-9 * sigma.max():
         raise InputError(
-            f"{table.path}: sigma from {sigma.min():g} to {sigma.max():g} m - {who} weighs all data alike, state one"
+            f"{table.path}: sigma from {sigma.min():g} to {sigma.max():g} {unit} - {who} weighs all data alike, set one"
         )
     return float(sigma[0])

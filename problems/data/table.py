@@ -11,7 +11,7 @@ import numpy as np
 
 from gradient_routes.problems.data.csv import NumberFile
 from gradient_routes.problems.data.headers import Column, check_known, match, pairs
-from gradient_routes.problems.data.units import PIXEL, Kind, factor, kind_of, quantity
+from gradient_routes.problems.data.units import PIXEL, Kind, factor, kind_of, quantity, zero
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
@@ -43,12 +43,14 @@ class Table:
     columns   name -> (n_rows,) in SI
     lines     (n_rows,), of the file
     said      how units and columns were read, for a note; empty if numbers and names were taken as they are
+    units     name -> unit, of columns that have one
     """
 
     path: str | Path
     columns: Mapping[str, Array]
     lines: Array
     said: str
+    units: Mapping[str, str]
 
     def stack(self, names: Sequence[str]) -> Array:
         """(n_rows, n_names), NaN for columns that are not there."""
@@ -128,12 +130,15 @@ def read_table(
         if column.name in marked:
             _check_sentinel(path, column, raw, lines)
         raw *= factors.get(column.name, 1.0)
-        raw += shifts.get(column.name, 0.0)
+        raw += shifts.get(column.name, 0.0) + zero(column.unit or "", kinds[column.name])
         read[column.name] = raw
     every_row = {name: np.full(len(lines), value) for name, value in constants.items()}
     values = {name: f"shifted by {value:g}" for name, value in shifts.items()}
     values |= {name: f"= {value:g} in every row" for name, value in constants.items()}
-    return Table(path, read | every_row, lines, _said(found.values(), factors, values, others))
+    stated = {name: column.unit for name, column in found.items() if column.unit is not None}
+    how = {name: f"in {unit}, factor {factors[name]:g}" for name, unit in stated.items()}
+    how |= {name: f"in {unit}, plus {add:g}" for name, unit in stated.items() if (add := zero(unit, kinds[name]))}
+    return Table(path, read | every_row, lines, _said(found.values(), how, values, others), stated)
 
 
 def _assigned(
@@ -149,7 +154,11 @@ def _assigned(
         name: parts for name, text in headers.items() if (parts := re.fullmatch(r"(.*\S)\s+([-+]) *(\d.*)", text))
     }
     headers |= {name: parts[1] for name, parts in shifts.items()}
-    added = {name: quantity(parts[2] + parts[3], kinds[name], f"{who}: {name}") for name, parts in shifts.items()}
+    changes: dict[Kind, Kind] = {"temperature": "temperature change"}
+    added = {
+        name: quantity(parts[2] + parts[3], changes.get(kinds[name], kinds[name]), f"{who}: {name}")
+        for name, parts in shifts.items()
+    }
     return constants, headers, added
 
 
@@ -203,15 +212,15 @@ def _check_sentinel(path: str | Path, column: Column, values: Array, lines: Arra
 
 
 def _said(
-    columns: Iterable[Column], factors: Mapping[str, float], values: Mapping[str, str], others: Sequence[str]
+    columns: Iterable[Column], conversions: Mapping[str, str], values: Mapping[str, str], others: Sequence[str]
 ) -> str:
     by_unit: dict[str, list[str]] = {}
     for column in columns:
-        how = f"in {column.unit}, factor {factors[column.name]:g}" if column.name in factors else "as given"
+        how = conversions.get(column.name, "as given")
         what = column.name if column.header == column.name else f"{column.name} = {column.header}"
         by_unit.setdefault(how, []).append(what)
     parts = [f"{', '.join(names)} {how}" for how, names in by_unit.items()]
     parts += [f"{name} {value}" for name, value in values.items()]
     parts += [f"not read: {', '.join(others)}"] if others else []
-    plainly = len(parts) == 1 and not factors and " = " not in parts[0]
+    plainly = len(parts) == 1 and not conversions and " = " not in parts[0]
     return "" if plainly else f"read {' / '.join(parts)}"

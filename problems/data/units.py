@@ -10,17 +10,21 @@ from typing import Literal
 
 from gradient_routes.problems.errors import InputError
 
-Kind = Literal["length", "stress", "force", "ratio", "number"]
+Kind = Literal["length", "stress", "force", "ratio", "temperature", "temperature change", "number"]
 UNITS: Mapping[Kind, Mapping[str, float]] = {
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "stress": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6},
     "force": {"N": 1.0, "kN": 1e3},
     "ratio": {"1": 1.0, "%": 1e-2, "microstrain": 1e-6},
+    "temperature": {"K": 1.0, "degC": 1.0},
+    "temperature change": {"K": 1.0, "degC": 1.0},
     "number": {},
 }
+ZEROS: Mapping[tuple[Kind, str], float] = {("temperature", "degC"): 273.15}  # in SI, of units that start elsewhere
 PIXEL = "px"
-SPELLINGS = {"µm": "um", "μm": "um", "N/mm²": "N/mm2", "N/mm^2": "N/mm2", "-": "1"}
-LISTED = "; ".join(", ".join(factors) for factors in UNITS.values() if factors) + "; px with a scale, px:0.02mm"
+SPELLINGS = {"µm": "um", "μm": "um", "N/mm²": "N/mm2", "N/mm^2": "N/mm2", "-": "1", "°C": "degC", "C": "degC"}
+LISTED = "; ".join(dict.fromkeys(", ".join(factors) for factors in UNITS.values() if factors))
+LISTED += "; px with a scale, px:0.02mm"
 NO_SCALES: Mapping[str, float] = MappingProxyType({})
 
 
@@ -44,17 +48,23 @@ def factor(unit: str, kind: Kind, who: str, scales: Mapping[str, float] = NO_SCA
             return scales[PIXEL]
         raise InputError(f"{who}: a px has no length of its own - give its scale, as in units=px:0.02mm")
     found = kind_of(name, who)
-    if found != kind:
+    if name not in UNITS[kind]:
         wanted = f"give a {kind} ({', '.join(UNITS[kind])})" if UNITS[kind] else "leave the unit out"
         raise InputError(f"{who}: '{name}' is a unit of {found}, not of {kind} - {wanted}")
     return UNITS[kind][name]
 
 
-def standard_deviation(noise: float | str | None, of_file: bool, who: str) -> float:
-    """`noise` [m], 0 where it is None. Raises InputError unless it is finite and >= 0, of a file's data > 0."""
+def zero(unit: str, kind: Kind) -> float:
+    """The 0 of a unit, in SI."""
+    name = unit.strip()
+    return ZEROS.get((kind, SPELLINGS.get(name, name)), 0.0)
+
+
+def standard_deviation(noise: float | str | None, of_file: bool, who: str, kind: Kind = "length") -> float:
+    """`noise` in SI, 0 where it is None. Raises InputError unless it is finite and >= 0, of a file's data > 0."""
     if noise is None:
         return 0.0
-    sigma = quantity(noise, "length", f"{who}: noise={noise}")
+    sigma = quantity(noise, kind, f"{who}: noise={noise}")
     if sigma < 0.0 or (of_file and sigma == 0.0):
         least = "> 0, or leave it out where it is not known" if of_file else ">= 0"
         raise InputError(f"{who}: noise={noise} - give a standard deviation {least}")
@@ -80,4 +90,4 @@ def quantity(value: float | str, kind: Kind, who: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         raise InputError(f"{who}: '{value}' is not a finite number with a unit - write one, like 4e-7 or 0.4um")
-    return number * factor(parts[2], kind, who) if parts and parts[2] else number
+    return number * factor(parts[2], kind, who) + zero(parts[2], kind) if parts and parts[2] else number

@@ -16,7 +16,7 @@ from gradient_routes.problems.block import Block
 from gradient_routes.problems.data import csv
 from gradient_routes.problems.data.probes import Measured, groups, read_probes
 from gradient_routes.problems.data.table import Table, read_table
-from gradient_routes.problems.data.units import UNITS, factor, quantity
+from gradient_routes.problems.data.units import UNITS, factor, quantity, zero
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import Geometry
 from gradient_routes.problems.fem.locating import locate
@@ -205,7 +205,7 @@ def test_units_are_a_closed_list() -> None:
     for kind, factors in UNITS.items():
         for unit, wanted in factors.items():
             assert factor(unit, kind, "test") == wanted
-            assert quantity(f"2.5e1 {unit}", kind, "test") == 25.0 * wanted
+            assert quantity(f"2.5e1 {unit}", kind, "test") == 25.0 * wanted + zero(unit, kind)
     assert quantity(0.5, "length", "test") == quantity("0.5", "length", "test") == 0.5
     for text in ("nan", "inf", "x", "", "um", "0,4um", "1e999um", "0.4 parsec"):
         with pytest.raises(InputError, match="test: "):
