@@ -233,6 +233,7 @@ class Rod(Problem):
             value = str(given[name])
             if read.celsius and re.fullmatch(r"[-+.\de]+", value):
                 raise InputError(f"rod: {name}={value} has no unit, T of {path} is in degC - write {value}degC")
+        self.measured = True
         self.d, self.noise, self.read_as = read.T - self.fin.T_inf, read.sigma, read.notes
         return read.x
 
