@@ -432,11 +432,12 @@ class Fields:
 
 @dataclass(frozen=True)
 class ParameterView:
-    """Columns (n_p,) to show beside a gradient, and a `mark` for parameters that no datum depends on, the `blind`;
-    values of unknowns that are `eliminated` from J, by name.
+    """Columns (n_p,) to show beside a gradient, and a `mark` for parameters that no datum depends on, the `blind`.
+
+    remarks: sentences on the state, to show below them.
     """
 
     columns: Mapping[str, Array] = field(default_factory=dict)
     blind: Array | None = None
     mark: str = "blind"
-    eliminated: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()

@@ -148,7 +148,9 @@ class Subspace(Wrapped):
             return ParameterView()
         inner = super().view(p, u, lam)
         columns = {name: self.V.T @ column for name, column in inner.columns.items()}
-        return ParameterView(columns, None if inner.blind is None else self.V.T @ inner.blind, inner.mark)
+        return ParameterView(
+            columns, None if inner.blind is None else self.V.T @ inner.blind, inner.mark, inner.remarks
+        )
 
     def truth(self) -> Array | None:
         """None where the true p is not in the subspace."""

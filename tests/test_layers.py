@@ -28,6 +28,7 @@ TRACED = {
     "gradient_routes.problems.mechanics.energies",
     "gradient_routes.problems.mechanics.isotropic_functions",
     "gradient_routes.problems.mechanics.plane_energies",
+    "gradient_routes.problems.mechanics.principal_stress",
     "gradient_routes.routes.differentiable",
     "gradient_routes.routes.solvers.traced_iterations",
     "gradient_routes.routes.unrolled_newton",

@@ -135,6 +135,7 @@ ORDER = (
     "block",
     "plate",
     "rod",
+    "coupon",
     "advection",
     "fd-one-sided",
     "fd-central",

@@ -107,6 +107,15 @@ class NumberFile:
                 first += len(block)
         return np.concatenate(values, axis=1), np.concatenate(lines)
 
+    def words(self, place: int) -> list[str]:
+        """The cells of one column as they are written, of the rows that `read` reads."""
+        found: list[str] = []
+        with _text(self.path, self.file) as file:
+            for first, line in enumerate(islice(file, self.start, None), self.start + 1):
+                _, rows = self._rows([line], first)
+                found += [_cells(self.path, row, self.separator)[place] for row in rows]
+        return found
+
     def _rows(self, block: list[str], first: int) -> tuple[Array, list[str]]:
         """The lines with as many cells as the header, without blank ones and comments; and their numbers."""
         at = np.arange(first, first + len(block))

@@ -40,7 +40,7 @@ class Group:
 class Table:
     """What was read of a file.
 
-    columns   name -> (n_rows,) in SI
+    columns   name -> (n_rows,) in SI, or words
     lines     (n_rows,), of the file
     said      how units and columns were read, for a note; empty if numbers and names were taken as they are
     units     name -> unit, of columns that have one
@@ -120,13 +120,15 @@ def read_table(
         for name, column in found.items()
         if column.unit is not None
     }
+    numeric = [column for column in found.values() if kinds[column.name] != "word"]
+    words = {c.name: np.array(file.words(c.place)) for c in found.values() if c not in numeric}
     gaps = {found[name].place for group in groups if group.gaps for name in group.names if name in found}
     marked = {name for group in groups if group.marked for name in group.names}
-    numbers, lines = file.read([column.place for column in found.values()], gaps)
+    numbers, lines = file.read([column.place for column in numeric], gaps)
     if not lines.size:
         raise InputError(f"{path}: has a header and no rows - add one row a measured point")
     read = {}
-    for column, raw in zip(found.values(), numbers, strict=True):
+    for column, raw in zip(numeric, numbers, strict=True):
         if column.name in marked:
             _check_sentinel(path, column, raw, lines)
         raw *= factors.get(column.name, 1.0)
@@ -138,7 +140,7 @@ def read_table(
     stated = {name: column.unit for name, column in found.items() if column.unit is not None}
     how = {name: f"in {unit}, factor {factors[name]:g}" for name, unit in stated.items()}
     how |= {name: f"in {unit}, plus {add:g}" for name, unit in stated.items() if (add := zero(unit, kinds[name]))}
-    return Table(path, read | every_row, lines, _said(found.values(), how, values, others), stated)
+    return Table(path, read | every_row | words, lines, _said(found.values(), how, values, others), stated)
 
 
 def _assigned(

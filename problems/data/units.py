@@ -10,7 +10,7 @@ from typing import Literal
 
 from gradient_routes.problems.errors import InputError
 
-Kind = Literal["length", "stress", "force", "ratio", "temperature", "temperature change", "number"]
+Kind = Literal["length", "stress", "force", "ratio", "temperature", "temperature change", "number", "word"]
 UNITS: Mapping[Kind, Mapping[str, float]] = {
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "stress": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6},
@@ -19,6 +19,7 @@ UNITS: Mapping[Kind, Mapping[str, float]] = {
     "temperature": {"K": 1.0, "degC": 1.0},
     "temperature change": {"K": 1.0, "degC": 1.0},
     "number": {},
+    "word": {},
 }
 ZEROS: Mapping[tuple[Kind, str], float] = {("temperature", "degC"): 273.15}  # in SI, of units that start elsewhere
 PIXEL = "px"

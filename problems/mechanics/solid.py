@@ -316,7 +316,8 @@ class Solid(Problem):
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         x, moved = self.parameters.position, self.data.moved(u, p)
         columns = {} if x is None else dict(zip(AXES[: x.shape[1]], x.T, strict=True))
-        return ParameterView(columns, eliminated=moved)
+        motion = ", ".join(f"{name} {value:.4g}" for name, value in moved.items())
+        return ParameterView(columns, remarks=(f"eliminated from J: {motion}",) if motion else ())
 
 
 def in_space(x: Array) -> Array:

@@ -39,7 +39,8 @@ def test_the_motion_is_found_and_the_rest_fits(moved: tuple[Block, np.ndarray]) 
     block, p = moved
     u = Model(block).solve(p).u
     assert block.objective(u, p) < 1e-28
-    found = block.view(p, u, None).eliminated
+    found = block.data.moved(u, p)
+    assert block.view(p, u, None).remarks[0].startswith(f"eliminated from J: {NAMES[0]} 0.01, ")
     assert tuple(found) == NAMES
     assert [*found.values()] == pytest.approx([*SHIFT, *TURN], abs=1e-12)
 

@@ -76,9 +76,8 @@ def _estimates(out: Console, found: Inversion) -> None:
     if found.fit is not None:
         style = "yellow" if found.unexplained else ""
         out.print(Text(found.fit.described), style=style, soft_wrap=not out.is_terminal)
-    if found.view.eliminated:
-        moved = ", ".join(f"{name} {value:.4g}" for name, value in found.view.eliminated.items())
-        out.print(Text(f"eliminated from J: {moved}"), soft_wrap=not out.is_terminal)
+    for remark in found.view.remarks:
+        tables.say(out, remark)
     picture = cells(found)
     if picture:
         out.print(picture)
