@@ -91,7 +91,7 @@ class Coupon(Problem):
         else:
             curves = read_curves(data, asked, [*MODES], columns, units, self.noise)
             self.modes, lam, self.d, self.noise = curves.modes, curves.stretch, curves.stress, curves.sigma
-            self.read_as = curves.notes
+            self.read_as, self.measured = curves.notes, True
         self.states, self.n_state, self.synthetic = States.of(self.modes, lam), len(lam), data is None
         self.stress = stress(law)
         self.linear = self.incompressible or law == "linear"
