@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -34,11 +35,15 @@ def missing(problem: Problem, *, start: str, **options: Any) -> str | None:
 
 
 def cost_one_sided(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
-    return forward.solves(n_p + 1) if start == "cold" else near(forward, start)(n_p, step or ONE_SIDED)
+    return cold(forward, n_p + 1) if start == "cold" else near(forward, start)(n_p, step or ONE_SIDED)
 
 
 def cost_central(n_p: int, forward: ForwardWork, *, step: float | None, start: str) -> Work:
-    return forward.solves(2 * n_p) if start == "cold" else near(forward, start)(2 * n_p, step or CENTRAL)
+    return cold(forward, 2 * n_p) if start == "cold" else near(forward, start)(2 * n_p, step or CENTRAL)
+
+
+def cold(forward: ForwardWork, times: int) -> Work:
+    return forward.full(times, polish=0) if forward.newton == "auto" else forward.solves(times)
 
 
 def near(forward: ForwardWork, start: str) -> Callable[[int, float], Work]:
@@ -113,10 +118,17 @@ def shifted(p: Array, i: int, h: float) -> Array:
     return q
 
 
+def by_full_steps(model: Model) -> Model:
+    """Where steps are chosen for us: the noise that inexact ones leave in J, below rtol, would be divided by h."""
+    if model.solver.newton != "auto":
+        return model
+    return Model(model.problem, replace(model.solver, newton="full"), model.tally)
+
+
 def objective_near(model: Model, p: Array, start: str) -> tuple[Callable[[Array], float], float | None]:
     """J as a function of points near p, and J(p) where making that function took a solve at p."""
     if start == "cold":
-        return model.value, None
+        return by_full_steps(model).value, None
     base = model.solve(p, polish=1)  # else the remaining residual, 1e-12, would be divided by h = 1e-8
     factors = base.factors if start == "chord" else None
     return lambda q: float(model.solve(q, base, factors).J), float(base.J)

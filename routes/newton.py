@@ -35,8 +35,8 @@ class Solver:
                    iterating; auto: where a solve and an adjoint after it are cheaper so, iterations as far as one
                    factorization more ends the solve, by full steps from a state nearby. Solvers that iterate end
                    inexact steps and those of auto early. Full steps are taken on linear problems, for complex p, whose
-                   imaginary part no tolerance controls, and on problems without line search, where convergence is
-                   proved for full steps
+                   imaginary part no tolerance controls, on problems without line search, where convergence is
+                   proved for full steps, and with auto where J is differenced
     adjoint_rtol   |b - R_u x|_inf / |b|_inf of linearized solves, transposed or not, where they iterate
     polish         Newton steps after convergence, on nonlinear problems
     """

@@ -355,7 +355,7 @@ def _note_state(
     if unstable:
         some = f"{unstable} negative eigenvalue{'s' if unstable > 1 else ''}"
         record.note(f"R_u has {some} at u: the state is unstable")
-    if state.rate is not None and route.step is not None:
+    if model.solver.newton == "inexact" and state.rate is not None and route.step is not None:
         step = options.get("step") or route.step
         # a solve nearby may end anywhere below the tolerance
         looser = max(1.0, model.solver.rtol / state.residual) if state.residual else 1.0
