@@ -21,6 +21,8 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import Geometry
 from gradient_routes.problems.fem.locating import locate
 from gradient_routes.problems.fem.mesh import Mesh, box_mesh
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.sensitivity import sensitivities
 
 File = Callable[[str | bytes], str]
 SI = "x,y,z,ux,uy,uz\n0.5,0.25,0.75,1e-6,,-2e-6\n1,0,1,3e-6,4e-6,5e-6\n"
@@ -374,6 +376,9 @@ def test_data_are_weighted_by_their_noise(file: File) -> None:
     step = 1e-30j  # complex step: no cancellation
     assert (block.objective(u + step * v, p)).imag / 1e-30 == pytest.approx(lin.J_u @ v, rel=1e-12)
     assert seen.relative == pytest.approx(sigma / sigma_i)
+    plain = Block(**SMALL, data=file(NOISY.replace("sigma", "about")))
+    by_p = [sensitivities(model, model.solve(p)).dSu_dp for model in map(Model, (block, plain))]
+    np.testing.assert_allclose(*by_p, rtol=1e-12, atol=1e-15)  # of readings, whatever their weights
 
 
 @pytest.mark.parametrize(
