@@ -34,7 +34,7 @@ measured: $(READY) ## a published measurement to E and nu: flagged without the m
 	$(BIN)/routes invert --problem '$(STEEL),motion=rigid]' --optimizer gauss-newton --no-plot
 
 test: $(READY) ## install into .venv, then the tests
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n 3 --dist worksteal
 
 test-pythons: ## all routes on the bar, and some tests, on the oldest Python 3.11, 3.12 and 3.13 installed
 	python3 .ci/pythons.py $(TESTED)
