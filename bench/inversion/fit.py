@@ -6,13 +6,14 @@ noise and nothing of what is wrong with the model: where residuals exceed the no
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from gradient_routes.bench.inversion import posterior
-from gradient_routes.bench.inversion.objective import OUTSIDE
+from gradient_routes.bench.inversion.objective import OUTSIDE, observed
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
@@ -23,15 +24,20 @@ MANY = 50  # parameters, each of which takes a linearized solve
 NORMAL = 1.4826  # standard deviation of normal numbers, in medians of their sizes
 FAR = 5.0  # standard deviations beyond which a residual is an outlier
 EXCESS = 2.0  # times the noise, above which it does not explain the residuals
+MANY_OUTLIERS = 0.1  # of the data, above which they are no accidents
+NOTHING = 0.99  # of the data, residuals that leave them as they are
 STEP = 1e-30  # of complex steps
 EXCEEDS = "misfit exceeds noise"
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """Of S u - d in the unit of the data: how many; root mean square, with and without outliers; their number.
+    """Of S u - d in the unit of the data: how many; their root mean square; that of those which are no outliers, per
+    degree of freedom; the number of outliers.
 
-    sigma  the noise that is stated, 0 where it is not
+    sigma    the noise that is stated, 0 where it is not
+    freedom  data that are no outliers, less what was fitted to them
+    size     root mean square of d - S u_0: residuals of a model that says nothing
     """
 
     count: int
@@ -39,31 +45,53 @@ class Residuals:
     inner_rms: float
     outliers: int
     sigma: float
+    freedom: float
+    size: float = math.inf
 
     @classmethod
-    def of(cls, seen: Observation) -> Residuals:
+    def of(cls, seen: Observation, fitted: float = 0.0, unloaded: Observation | None = None) -> Residuals:
+        """`fitted`: how many data p takes up; `unloaded`: the data term at u_0."""
         r = np.abs(seen.predicted - seen.data) / seen.weight
         sigma = seen.sigma / seen.weight
         inner = r[inliers(r, sigma)]
-        freedom = max(1, len(inner) - (0 if seen.modes is None else seen.modes.shape[1]))
-        return cls(len(r), rms(r, len(r)), rms(inner, freedom), len(r) - len(inner), sigma)
+        freedom = len(inner) - fitted - (0 if seen.modes is None else seen.modes.shape[1])
+        inner_rms = rms(inner, max(1.0, freedom))
+        size = math.inf if unloaded is None else rms(unloaded.predicted - unloaded.data, len(r)) / seen.weight
+        return cls(len(r), rms(r, len(r)), inner_rms, len(r) - len(inner), sigma, freedom, size)
+
+    @property
+    def nothing(self) -> bool:
+        """Whether the model explains none of the data: residuals are as large as they are."""
+        return self.rms > NOTHING * self.size > 0.0
+
+    @property
+    def unexplained(self) -> bool:
+        return self.nothing or self.exceed
 
     @property
     def exceed(self) -> bool:
         """Whether the residuals are no noise of the size that is stated."""
-        return self.sigma > 0.0 and self.inner_rms > EXCESS * self.sigma
+        larger = self.inner_rms > EXCESS * self.sigma or self.outliers > MANY_OUTLIERS * self.count
+        return self.sigma > 0.0 and larger
+
+    @property
+    def noise(self) -> float:
+        """As stated, else as the residuals tell; 0 where they cannot, with no more data than were fitted."""
+        return self.sigma or (self.inner_rms if self.freedom >= 1.0 else 0.0)
 
     @property
     def described(self) -> str:
         beyond = f"; {self.rms:.3g} with {self.outliers} outliers of {self.count}" if self.outliers else ""
+        if self.nothing:
+            return f"nothing explained: residuals of rms {self.rms:.3g}, of data of rms {self.size:.3g}"
+        if not self.noise:
+            return "no error bars: noise is not stated, and no data are left to tell it - give noise="
         if not self.sigma:
-            return f"residuals: rms {self.inner_rms:.3g}{beyond}; noise not stated"
+            return f"residuals: rms {self.inner_rms:.3g}{beyond}; noise not stated, taken from them"
         stated = f"noise {self.sigma:.3g}"
         if self.exceed:
-            times = self.inner_rms / self.sigma
-            return (
-                f"{EXCEEDS}: residuals of rms {self.inner_rms:.3g}{beyond} against {stated}, {times:.2g} times as much"
-            )
+            times = f"{self.inner_rms / self.sigma:.2g} times as much"
+            return f"{EXCEEDS}: residuals of rms {self.inner_rms:.3g}{beyond} against {stated}, {times}"
         return f"residuals: rms {self.inner_rms:.3g}{beyond}; {stated}"
 
 
@@ -94,7 +122,7 @@ def inliers(r: Array, sigma: float) -> Array:
     return np.asarray(r <= FAR * max(NORMAL * float(np.median(r)), sigma))
 
 
-def rms(r: Array, freedom: int) -> float:
+def rms(r: Array, freedom: float) -> float:
     return float(np.sqrt(np.sum(r**2) / freedom)) if len(r) else 0.0
 
 
@@ -111,22 +139,31 @@ def fit(problem: Problem, p: Array, solver: Solver) -> Fit | None:
         return None
     if seen is None or not len(seen.data):
         return None
-    residuals = Residuals.of(seen)
-    sigma = seen.sigma or residuals.inner_rms * seen.weight
-    sd = posterior.known(problem, p, H, scale, sigma).sd
+    unloaded = observed(problem, p)
     if H is None:
-        return Fit(residuals, sd)
-    return Fit(residuals, sd, _stated(problem, p, H, scale, sigma), _thirds(problem, p, H, scale, seen))
+        return Fit(Residuals.of(seen, unloaded=unloaded), np.full(len(p), np.nan))
+    prior = posterior.prior_rows(problem, p, scale)
+    A = H if prior is None else np.concatenate([H, prior])
+    residuals = Residuals.of(seen, fitted(H, A), unloaded)
+    sigma = residuals.noise * seen.weight
+    sd = posterior.known(problem, p, H, scale, sigma).sd
+    return Fit(residuals, sd, _stated(problem, p, A, scale, sigma), _thirds(problem, p, H, scale, seen))
 
 
-def _stated(problem: Problem, p: Array, H: Array, scale: Array, sigma: float) -> dict[str, tuple[float, float]]:
+def fitted(H: Array, A: Array) -> float:
+    """Data that p takes up: the trace of H (A^T A)^+ H^T, of A the rows of H and of the prior."""
+    R = np.asarray(np.linalg.qr(A, mode="r"))
+    return float(np.sum((H @ np.linalg.pinv(R, rcond=max(A.shape) * posterior.EPS)) ** 2))
+
+
+def _stated(problem: Problem, p: Array, A: Array, scale: Array, sigma: float) -> dict[str, tuple[float, float]]:
     """Values and error bars, these by the derivatives of the constants in p, which complex steps give."""
     values = problem.stated(p)
     if not values:
         return {}
     by_x = np.array([[v.imag / STEP for v in problem.stated(p + 1j * STEP * e).values()] for e in np.diag(scale)]).T
-    R = np.asarray(np.linalg.qr(H, mode="r"))
-    if np.linalg.cond(R) > 1.0 / posterior.EPS:
+    R = np.asarray(np.linalg.qr(A, mode="r"))
+    if not sigma or len(R) < len(p) or np.linalg.cond(R) > 1.0 / posterior.EPS:
         return {name: (float(value.real), np.nan) for name, value in values.items()}
     sd = sigma * np.linalg.norm(np.linalg.solve(R.T, by_x.T), axis=0)
     return {name: (float(value.real), float(s)) for (name, value), s in zip(values.items(), sd, strict=True)}

@@ -102,8 +102,8 @@ class Inversion:
 
     @property
     def unexplained(self) -> bool:
-        """Whether the model does not explain the data: residuals exceed their noise."""
-        return self.fit is not None and self.fit.residuals.exceed
+        """Whether the model does not explain the data: residuals exceed their noise, or the data themselves."""
+        return self.fit is not None and self.fit.residuals.unexplained
 
     @property
     def forward_solves(self) -> int:
@@ -120,7 +120,8 @@ class Inversion:
         last = len(self.iterates) - 1
         rows = [self.shared | asdict(iterate) | {"ending_solves": None} for iterate in self.iterates]
         rows[last]["ending_solves"] = self.ending_solves
-        rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end)))
+        doubt = self.fit.residuals.described if self.fit is not None and self.unexplained else None
+        rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end, doubt)))
         return {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
 
     def _estimate(self, i: int) -> Row:
@@ -242,7 +243,9 @@ def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Pro
     q = None if c is None else problem.scaled(p, c)
     if c is None or q is None:
         return problem, p, None
-    return problem.stiffened(c), q, f"the start is made {c:.3g} times as stiff, which fits the data best"
+    other = problem.stiffened(c)
+    other.regularization = problem.regularization  # J stays what it was
+    return other, q, f"the start is made {c:.3g} times as stiff, which fits the data best"
 
 
 def stopped(objective: Objective, says: str) -> Stop:

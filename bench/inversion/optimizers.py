@@ -23,7 +23,7 @@ SPENT = 1  # status of SciPy's minimizers: the iterations are used up; any other
 
 @dataclass(frozen=True)
 class Limits:
-    """iterations at most; tolerance on |dJ/dx| relative to 1/2 |d|^2 or the start; rate of the steps of adam."""
+    """iterations at most; tolerance on |dJ/dx| relative to the start or to 1/2 |d|^2; rate of the steps of adam."""
 
     iterations: int = 200
     tolerance: float = 1e-9

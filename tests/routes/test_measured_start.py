@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gradient_routes.bench.cases.case import problems, routes
+from gradient_routes.bench.cases.case import ProblemSpec, problems, routes
 from gradient_routes.bench.inversion.invert import Engine, invert
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
+from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.errors import NotOffered
+from gradient_routes.problems.problem import Linearization, Offers, Parameters, Problem
 from gradient_routes.routes.measured_start import NEAR, fitted_factor, with_measured_start
 from gradient_routes.routes.model import Model
 
@@ -95,3 +97,48 @@ def test_a_file_is_fitted_from_a_body_without_a_field(tmp_path) -> None:
     block = Block(n=2, derivatives="hand", data=block_csv(tmp_path, made, made.parameters.start))
     assert block.parameters.start.tolist() == [0.0] * 8
     assert Model(block).value(block.parameters.start) < 1e-28
+
+
+def test_a_prior_stays_where_it_was_when_a_start_is_scaled(tmp_path) -> None:
+    """Its centre is the start that was asked for, a thousandth of what the data tell; it wins."""
+    made = Block(n=2, derivatives="hand", unknown="constants", traction=0.2, modulus=1.0)
+    data = block_csv(tmp_path, made, made.parameters.start)
+    options = f"n=2,derivatives=hand,unknown=constants,traction=0.2,data={data},modulus=1000.0"
+    (spec,) = problems([f"block[{options},alpha=1e9,phi=amplitude]"])
+    ended = invert(spec, routes(["adjoint"])[0], Engine())
+    assert ended.iterates[0].says is not None
+    assert ended.p == pytest.approx(spec().parameters.start, rel=1e-6)
+
+
+class Warm(Problem):
+    """u = c + exp(-p), data c + 1: c is a temperature in kelvin, and exp(-p) what p has to do with it."""
+
+    name = "warm"
+    offers = Offers.LINEARIZE
+    n_state = 2
+    linear = True
+
+    def __init__(self, *, c: float, start: float = 1.0) -> None:
+        self.c, self.parameters = c, Parameters(start=np.full(2, start), scale=np.ones(2))
+
+    def residual(self, u, p):
+        return u - self.c - np.exp(-p)
+
+    def tangent(self, u, p):
+        return np.eye(2)
+
+    def objective(self, u, p):
+        return 0.5 * ((u - self.c - 1.0) ** 2).sum()
+
+    def linearize(self, u, p):
+        return Linearization(np.diag(np.exp(-p)), u - self.c - 1.0, np.zeros(2))
+
+    def observation(self, u, p):
+        return Observation(u, np.full(2, self.c + 1.0), np.eye(2))
+
+
+@pytest.mark.parametrize("c", [0.0, 300.0, 1e5])
+def test_the_end_does_not_depend_on_where_temperatures_count_from(c: float) -> None:
+    ended = invert(ProblemSpec("warm", {"c": c}, Warm), routes(["adjoint"])[0], Engine())
+    assert ended.end.startswith("converged: |dJ/dp| is 1e-09 of that at the start")
+    assert np.abs(ended.p).max() < 1e-8

@@ -173,6 +173,7 @@ class Run:
         self._tell(best.made)
         self._warn(best)
         self._judge([point.inversion for point in points])
+        self.misled = self.misled or best.unexplained
         self._keep("lcurve", [point.row for point in points])
         for table, rows in best.tables.items():
             self._keep(table, rows)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gradient_routes.bench.cases.case import problems, routes
-from gradient_routes.bench.inversion.fit import Residuals
+from gradient_routes.bench.inversion.fit import Residuals, fitted
 from gradient_routes.bench.inversion.invert import Engine, invert
 from gradient_routes.problems.data.observation import Observation
 
@@ -31,6 +31,18 @@ def test_noise_explains_residuals_of_its_size_with_and_without_outliers() -> Non
     assert "with 20 outliers of 1000; noise 0.001" in spoilt.described
 
 
+def test_many_outliers_are_no_accidents() -> None:
+    """A tenth of the data may be wrong by chance; a model that misses more of them is wrong, however well it meets
+    the others.
+    """
+    r = SIGMA * np.random.default_rng(0).standard_normal(1000)
+    for count, exceed in ((90, False), (110, True)):
+        r[:count] = 0.1
+        found = residuals(r, SIGMA)
+        assert (found.outliers, found.exceed) == (count, exceed)
+        assert ("misfit exceeds noise" in found.described) == exceed
+
+
 def test_residuals_of_three_times_the_noise_exceed_it() -> None:
     found = residuals(3.0 * SIGMA * np.random.default_rng(0).standard_normal(1000), SIGMA)
     assert found.exceed
@@ -48,6 +60,45 @@ def test_error_bars_of_one_modulus_are_the_closed_form(tmp_path) -> None:
     assert found.fit.sd == pytest.approx([SIGMA * 16.0], rel=1e-6)
     assert found.tables["estimates"][0]["sd"] == found.fit.sd[0]
     assert not found.unexplained
+
+
+def test_noise_is_not_told_by_data_that_are_met_exactly(tmp_path) -> None:
+    """Two data, two moduli that they see: residuals are rounding, and no error bar may rest on them."""
+    (tmp_path / "d.csv").write_text("node,displacement\n1,0.25\n2,0.6\n")
+    for noise, barred in (("", False), (f",noise={SIGMA}", True)):
+        (spec,) = problems([f"bar[n=2,parametrization=raw,data={tmp_path}/d.csv{noise}]"])
+        found = invert(spec, routes(["adjoint"])[0], Engine()).fit
+        assert found is not None
+        assert found.residuals.freedom == pytest.approx(0.0, abs=1e-9)
+        assert np.isfinite(found.sd).all() == barred
+        assert ("no error bars" in found.described) != barred
+
+
+def test_noise_that_is_not_stated_is_that_per_degree_of_freedom() -> None:
+    """Three readings of one spring: sd(E) by least squares, with m - 1 in its denominator."""
+    u = np.array([0.25, 0.5, 0.74])  # of nodes 1 to 3 of a homogeneous bar of three elements
+    x = np.arange(1, 4) / 3.0
+    E = (x @ x) / (x @ u)
+    r = x / E - u
+    s = np.sqrt(r @ r / 2.0)
+    H = -x / E**2
+    seen = Observation(x / E, u, None)
+    assert Residuals.of(seen, fitted=1.0).noise == pytest.approx(s, rel=1e-12)
+    assert fitted(H[:, None], H[:, None]) == pytest.approx(1.0, rel=1e-12)
+    assert fitted(H[:, None], np.concatenate([H, [1e3]])[:, None]) == pytest.approx(H @ H / (H @ H + 1e6), rel=1e-9)
+
+
+def test_a_model_that_explains_nothing_is_flagged_without_noise(tmp_path, cli) -> None:
+    """Data against the load: the stiffer, the better, and no modulus explains them."""
+    (tmp_path / "d.csv").write_text("node,displacement\n1,-0.25\n2,-0.5\n")
+    ran = cli("invert", "--problem", "bar[n=2,data=d.csv]", "--no-store", "--no-plot")
+    assert ran.code == 1
+    assert "nothing explained: residuals of rms 0.39" in ran.out
+    ran = cli("invert", "--problem", "bar[n=2,data=d.csv]", "--no-store", "--json")
+    assert ran.code == 1
+    assert any("nothing explained" in (row.get("says") or "") for row in ran.rows)
+    swept = ("--alpha-sweep", "1e-9", "1e-8", "2", "--no-store", "--no-plot")
+    assert cli("invert", "--problem", "bar[n=2,data=d.csv]", *swept).code == 1
 
 
 STRETCHED = "plate[n=2,law=linear,unknown=constants,traction=0.1,noise=1e-5,data=d.csv]"
