@@ -34,6 +34,7 @@ def sensitivities(model: Model, state: State, columns: Columns) -> Sensitivities
     seen = model.problem.observation(state.u, state.p)
     if seen is None:
         raise InputError(f"{model.problem.name}: has no observation S u - give --sensitivities-of state")
+    seen = seen.whole or seen  # readings move, whatever J eliminates from them
     values = seen.S_u @ du_dp
     if seen.S_p is not None:
         values = values + seen.S_p @ np.eye(len(state.p))[:, chosen]

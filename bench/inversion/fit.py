@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gradient_routes.bench.inversion import posterior
-from gradient_routes.bench.inversion.objective import OUTSIDE, observed
+from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, observed
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
@@ -126,13 +126,15 @@ def rms(r: Array, freedom: float) -> float:
     return float(np.sqrt(np.sum(r**2) / freedom)) if len(r) else 0.0
 
 
-def fit(problem: Problem, p: Array, solver: Solver) -> Fit | None:
-    """At the answer p, by one forward solve and one linearized solve a parameter; None unless data were measured."""
+def fit(problem: Problem, found: Evaluation, solver: Solver) -> Fit | None:
+    """At the answer, by one linearized solve a parameter, and a forward solve where its route has no state; None unless
+    data were measured.
+    """
     if not problem.measured or Offers.LINEARIZE not in problem.offers:
         return None
-    model, scale = Model(problem, solver), problem.parameters.scale
+    model, scale, p = Model(problem, solver), problem.parameters.scale, found.p
     try:
-        state = model.solve(p)
+        state = model.solve(p) if found.u is None else model.state_at(found.u, p)
         seen = problem.observation(state.u, p)
         H = Sensitivity(model, state, scale).dense() if len(p) <= MANY else None
     except OUTSIDE:

@@ -227,7 +227,7 @@ def invert(
         interrupted,
         variables.warning(None if seen is None else seen.data),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
-        None if interrupted else fit(problem, last.p, engine.solver),
+        None if interrupted else fit(problem, last, engine.solver),
     )
 
 

@@ -24,7 +24,7 @@ class Observation:
     label              (k) -> name of datum k
     weight             factor contained in predicted, data, S_u and sigma
     relative           weights of the data, relative to their mean accuracy, contained in them as well
-    sampling (m, n_u)  S, sparse, where S_u is what is left of it after `modes` (m, k) were eliminated
+    whole              all of this before `modes` (m, k) were eliminated, where there are any
     position (m, d)    of each datum [m], or None
     """
 
@@ -36,7 +36,7 @@ class Observation:
     label: Callable[[int], str] = str
     weight: float = 1.0
     relative: Array | float = 1.0
-    sampling: Any = None
+    whole: Observation | None = None
     modes: Array | None = None
     position: Array | None = None
 
@@ -76,7 +76,7 @@ class Observation:
             data=projected(self.data),
             S_u=LinearOperator(S.shape, matvec=stacked, rmatvec=spread, matmat=stacked, rmatmat=spread, dtype=float),
             S_p=None if self.S_p is None else np.stack([projected(column) for column in self.S_p.T], axis=1),
-            sampling=self.S_u,
+            whole=self,
             modes=np.kron(np.eye(cases), motion.Q),
         )
 

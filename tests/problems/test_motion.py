@@ -78,6 +78,10 @@ def test_the_gradient_is_H_transposed_times_the_residuals(moved: tuple[Block, np
     assert relative_error(H.T @ r, adjoint.route.prepare(model, p)(p).gradient) < 1e-12
     assert relative_error(H.dense().T @ r, H.T @ r) < 1e-12
     assert seen.modes.shape == (len(r), 6)
+    read = seen.whole.S_u @ state.u  # what the sensors read, motion and all
+    assert read == pytest.approx(
+        block.data.probes.read(block.data._probe_displacements(state.u, block.solid.setup(p))[0]).ravel()
+    )
 
 
 def test_weights_are_those_of_J() -> None:

@@ -116,9 +116,7 @@ def _candidates(problem: Problem, H: Sensitivity, afresh: bool, seed: int) -> tu
     offered = problem.candidates() or Candidates(np.arange(problem.n_state), lambda j: f"u_{j + 1}")
     kept, notes = np.arange(len(offered.at)), []
     if not afresh:
-        kept = np.flatnonzero(
-            ~np.isin(offered.at, _measured(H.seen.S_u if H.seen.sampling is None else H.seen.sampling))
-        )
+        kept = np.flatnonzero(~np.isin(offered.at, _measured((H.seen.whole or H.seen).S_u)))
     room = max(1, LARGEST // (8 * H.shape[1]))
     if len(kept) > room:
         needed = size(8.0 * len(kept) * H.shape[1])
