@@ -56,6 +56,9 @@ class NotConverged(RoutesError):
         self.history = history
 
 
+OUTSIDE = (DomainError, NotConverged, SingularMatrix, Overflow, FloatingPointError)  # of where J has a value
+
+
 def check_applies(who: str, *rules: tuple[str, bool, bool, dict[str, Any]]) -> None:
     """Raises InputError for options that would be ignored.
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 import copy
 import math
 
-from gradient_routes.problems.errors import DomainError, NotConverged, Overflow, SingularMatrix
+from gradient_routes.problems.errors import OUTSIDE
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 
-OUTSIDE = (DomainError, NotConverged, SingularMatrix, Overflow, FloatingPointError)
 NEAR = 0.01  # relative change of c that no longer matters to an optimizer
 TRIES = 12  # solves for c at finite strain
 STIFFER = 2.0  # where the body gives way under its load

@@ -72,10 +72,13 @@ class Full:
         self.factors = None
         self.factors = self._do.factorize(self._do.assemble(u))
         self._do.step()
-        return self._do.substitute(self.factors, R), self.factors.norm
+        return self._do.substitute(self._solver(self.factors, R, scale, goal), R), self.factors.norm
 
     def renew(self) -> bool:
         return False
+
+    def _solver(self, factors: Factorization, R: Array, scale: float, goal: float) -> Factorization:
+        return factors
 
 
 @dataclass(frozen=True)
@@ -224,24 +227,13 @@ class Auto(Inexact):
         return per_row / PER_ROW
 
 
-class Truncated:
+class Truncated(Full):
     """|R - R_u du| <= eta |R|, eta as for Inexact, by a linear solver that iterates, R_u assembled at every u."""
 
     rate: float | None = math.inf
 
-    def __init__(self, operations: Operations) -> None:
-        self._do = operations
-        self.factors: Factorization | None = None
-
-    def __call__(self, u: Array, R: Array, scale: float, goal: float) -> Correction:
-        self.factors = None
-        self.factors = self._do.factorize(self._do.assemble(u))
-        self._do.step()
-        eta = forcing(float(np.abs(R).max(initial=0.0)), scale, goal)
-        return self._do.substitute(self.factors.to(eta), R), self.factors.norm
-
-    def renew(self) -> bool:
-        return False
+    def _solver(self, factors: Factorization, R: Array, scale: float, goal: float) -> Factorization:
+        return factors.to(forcing(float(np.abs(R).max(initial=0.0)), scale, goal))
 
 
 def forcing(size: float, scale: float, goal: float) -> float:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
-from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
+from gradient_routes.bench.inversion.objective import Evaluation, Objective
+from gradient_routes.problems.errors import OUTSIDE
 from gradient_routes.problems.problem import Offers
 from gradient_routes.routes.corrected import adjoint_at, error_bar
 from gradient_routes.routes.model import Model

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gradient_routes.bench.inversion import posterior
-from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, observed
+from gradient_routes.bench.inversion.objective import Evaluation, observed
 from gradient_routes.problems.data.observation import Observation
+from gradient_routes.problems.errors import OUTSIDE
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver

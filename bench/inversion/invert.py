@@ -20,10 +20,10 @@ from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.fit import Fit, fit
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
-from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective, observed
+from gradient_routes.bench.inversion.objective import Evaluation, Objective, observed
 from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, converged, flat, optimizer
 from gradient_routes.bench.inversion.variables import Positive, Variables
-from gradient_routes.problems.errors import RoutesError
+from gradient_routes.problems.errors import OUTSIDE, RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
 from gradient_routes.routes.measured_start import fitted_factor, small_strain_factor
 from gradient_routes.routes.model import Model

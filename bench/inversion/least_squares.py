@@ -8,9 +8,9 @@ import numpy as np
 
 from gradient_routes.bench.inversion.diagnosis import explained
 from gradient_routes.bench.inversion.history import History
-from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
+from gradient_routes.bench.inversion.objective import Evaluation, Objective
 from gradient_routes.bench.inversion.optimizers import Limits, Stopped, accept, minimized, spent
-from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.errors import OUTSIDE, InputError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.newton import State
 from gradient_routes.routes.sensitivity import Sensitivity

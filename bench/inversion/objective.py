@@ -11,13 +11,12 @@ import numpy as np
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.variables import Variables
 from gradient_routes.problems.data.observation import Observation
-from gradient_routes.problems.errors import DomainError, NotConverged, Overflow, RoutesError, SingularMatrix
+from gradient_routes.problems.errors import OUTSIDE, Overflow, RoutesError
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Options, Route
 
-OUTSIDE = (DomainError, NotConverged, SingularMatrix, Overflow, FloatingPointError)
 SAME = 1e-5  # relative difference of J that a forward tolerance explains
 STEEP = 10.0  # slope of the extension, in slopes of J at the last accepted step
 

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
-from gradient_routes.bench.inversion.objective import OUTSIDE, Evaluation, Objective
+from gradient_routes.bench.inversion.objective import Evaluation, Objective
+from gradient_routes.problems.errors import OUTSIDE
 from gradient_routes.problems.problem import Array
 
 STEPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # of x, relative to its size where that is above one
