@@ -97,6 +97,7 @@ class Block(Solid):
             "cases": len(solid.directions) > 1,
             "unknown": solid.design.parameter_of_cell is None,
             "markers" if options["markers"] else "data": probes.nodes.shape[1] > 1 or not probes.measured.all(),
+            "motion": self.data.motion is not None,
             "alpha": self.alpha > 0.0,
         }
         for name in (name for name, holds in undescribed.items() if holds):

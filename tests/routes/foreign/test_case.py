@@ -98,6 +98,7 @@ def test_the_law_and_its_constants_are_told() -> None:
         ("block[n=1,unknown=constants]", "unknown=constants"),
         ("block[n=1,markers=3]", "markers=3"),
         ("block[n=1,alpha=0.5]", "alpha=0.5"),
+        ("block[n=1,data=twin,motion=translation]", "motion=translation"),
     ],
 )
 def test_an_option_that_other_codes_cannot_be_told_is_named(selector: str, what: str) -> None:
