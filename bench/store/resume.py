@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Literal
 
 from gradient_routes.bench.cases.column import Row
@@ -66,11 +65,16 @@ def _is_in(apart: Store, row: Row) -> bool:
     return False
 
 
-def add_kept_apart(store: Store) -> list[tuple[Path, int, int]]:
-    """Add to a store what earlier runs could not, and delete their files: which, how many cases and studies."""
-    added = []
+def add_kept_apart(store: Store) -> list[str]:
+    """Add to a store what earlier runs could not, and delete their files; what to say of each."""
+    said = []
     for path in kept_apart(store):
-        with suppress(InputError):  # another run writes it, or has added it
-            added.append((path, *merge(store, Store(path))))
+        try:
+            cases, studies = merge(store, Store(path))
             path.unlink(missing_ok=True)
-    return added
+        except InputError as error:
+            if path.exists() and path.stat().st_size:  # else another run writes it, or has added it
+                said.append(f"{error}; cases in it count as done")
+        else:
+            said.append(f"{cases} cases and {studies} studies of {path} added to {store.path}")
+    return said

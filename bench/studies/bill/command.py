@@ -211,8 +211,8 @@ def _wanted(
         refuse_given(("resume", "only"), "looks into a store, with --no-store there is none")
     if store is None or only == "all" or not (resume or only):
         return everything
-    for path, cases, studies in add_kept_apart(store):
-        complain(f"{cases} cases and {studies} studies of {path} added to {store.path}")
+    for line in add_kept_apart(store):
+        complain(line)
     return still_open(store, OPEN if only is None else (only,), lambda row: as_expected(row, known))
 
 

@@ -248,6 +248,20 @@ def test_what_another_runner_keeps_apart_is_done(tmp_path: Path, monkeypatch: py
     assert (len(store.rows()), path.exists(), len(kept_apart(store))) == (1, False, 1)
 
 
+def test_what_cannot_be_added_is_said(tmp_path: Path) -> None:
+    """Its cases count as done: nobody runs them, and they are in no store."""
+    store = Store(tmp_path / "s.sqlite")
+    store.append(empty_row(), None)
+    apart(store, lambda other: other.append(empty_row() | {"case_key": "1"}, None), "")
+    (path,) = kept_apart(store)
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("CREATE TABLE strange (study_id INTEGER)")
+        db.commit()
+    (line,) = add_kept_apart(store)
+    assert "has a table 'strange' - install the study that it is of; cases in it count as done" in line
+    assert path.exists()
+
+
 def test_a_row_of_an_older_schema_is_missing(plugin: Path, forks: Forks) -> None:
     """It has no key: what it was an answer to is not known."""
     ran = running(forks, plugin)
