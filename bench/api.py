@@ -181,7 +181,7 @@ def invert(
 
     optimizer   "lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent" or "adam"
     iterations  at most
-    tolerance   ends where |dJ/dp|, per natural change of p, is so much of its first; of stiffnesses, of 1/2 |d|^2
+    tolerance   ends where |dJ/dp|, per natural change of p, is so much of its first, or of 1/2 |d|^2 (stiffness, rod)
     positive    "log" or "softplus": what keeps a raw parameter > 0
     rate        of adam's steps, in natural changes of p
 

@@ -229,6 +229,7 @@ class Problem:
     typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
                no one in particular
     start_from_data  whether the start of p says nothing of the body that was measured: its size comes from the data
+    from_rest  whether data are zero without the load, and so as large as what p is there to explain
     measured   whether the data come from a file
     notes      sentences a user should read beside the result
     read_as    those of them that say how a data file was read
@@ -249,6 +250,7 @@ class Problem:
     stop: Stop | None = None
     typical: int | None = None
     start_from_data: bool = False
+    from_rest: bool = False
     measured: bool = False
     notes: tuple[str, ...] = ()
     read_as: tuple[str, ...] = ()

@@ -50,6 +50,7 @@ class Rod(Problem):
     linear = True
     structure = "spd"
     typical = 0
+    from_rest = True
     regularization: Prior
 
     def __init__(

@@ -12,10 +12,13 @@ from gradient_routes.bench.inversion.slopes import EPS, ROUNDED, STEPS, Along, d
 from gradient_routes.problems.problem import Array
 
 CONVERGED = "converged"
+LEVEL = "stopped: J is level here, p no longer matters to the data - choose another start, or bounds"
 SEED = 0  # of the random directions
 STEP = 1e-4  # of x along them, in natural changes: truncation is h^2, rounding of J is eps / h
 CURVED = 10.0  # J''' / J'' over a natural change, at most
 INSIDE = 0.5  # part of the way to a bound that the largest step goes at most
+WIDE = 1e-2  # of x along them, where J bends by no more than rounding over the first
+ENDLESS = 0.01  # of max(1, |x|): what a Newton step still goes where J is level rather than at a minimum
 SUSPECT = 0.05  # relative difference of promised and actual changes of J, the median over the steps
 
 
@@ -34,10 +37,11 @@ def confirmed(objective: Objective, history: History, end: str, tolerance: float
     if not end.startswith((CONVERGED, AT_MINIMUM)):
         return end
     before = objective.forward_solves
-    remarks = []
-    for v in directions(objective):
+    remarks, around = [], [Beside(objective, v) for v in directions(objective)]
+    for each in around:
+        v = each.v
         claim = tolerance * objective.slope_scale * norm2(v)
-        if not doubted and flat(objective, v, claim):
+        if not doubted and each.confirms(claim):
             continue
         seen = examined(objective, objective.accepted, v)
         if seen.blame == "gradient" and abs(seen.slopes.promised - seen.slopes.found) > claim:
@@ -48,6 +52,8 @@ def confirmed(objective: Objective, history: History, end: str, tolerance: float
             remarks.append(f"J is not defined beside it: {seen.slopes.edge}")
         elif seen.slopes.kink:
             remarks.append("J has a kink there")
+    if all(each.level for each in around):
+        return LEVEL
     if remarks:
         return f"{end}; not confirmed: {remarks[0]}"
     return f"{end}, confirmed by {objective.forward_solves - before} forward solves"
@@ -67,15 +73,29 @@ def directions(objective: Objective) -> list[Array]:
     return found
 
 
-def flat(objective: Objective, v: Array, claim: float) -> bool:
-    """Whether J(x + h v) - J(x - h v) is what the gradient promises, up to the slope that the inversion claims to have
-    left, to rounding, and to truncation, which is h^3 J'''/3; two forward solves.
-    """
-    at = objective.accepted
-    J = Along(objective, at.x, v)
-    h = STEP * J.size
-    below, above = J(-STEP), J(STEP)
-    off = abs(above - below - 2.0 * h * float(at.by_x @ v))
-    rounding = ROUNDED * EPS * max(abs(at.J), abs(above), abs(below))
-    truncation = CURVED * STEP * abs(above - 2.0 * at.J + below)
-    return off <= 2.0 * h * claim + rounding + truncation  # never, where J is not defined
+class Beside:
+    """J on both sides of the last accepted step, by two forward solves."""
+
+    def __init__(self, objective: Objective, v: Array) -> None:
+        self.v, self.J, self.J_0 = v, Along(objective, objective.accepted.x, v), objective.accepted.J
+        self.slope = self.J.size * float(objective.accepted.by_x @ v)  # over a natural change, as promised
+        self.below, self.above = self.J(-STEP), self.J(STEP)
+        self.rounding = ROUNDED * EPS * max(abs(self.J_0), abs(self.above), abs(self.below))
+
+    def confirms(self, claim: float) -> bool:
+        """Whether J(x + h v) - J(x - h v) is what the gradient promises, up to the slope that the inversion claims to
+        have left, to rounding, and to truncation, which is h^3 J'''/3.
+        """
+        off = abs(self.above - self.below - 2.0 * STEP * self.slope)
+        truncation = CURVED * STEP * abs(self._bend(self.below, self.above))
+        return off <= 2.0 * STEP * self.J.size * claim + self.rounding + truncation  # never, where J is not defined
+
+    @property
+    def level(self) -> bool:
+        """Whether J bends so little that a Newton step would go on, as where p no longer matters; by 0 or 2 solves."""
+        if not self._bend(self.below, self.above) <= self.rounding:
+            return False
+        return self._bend(self.J(-WIDE), self.J(WIDE)) <= self.rounding + WIDE**2 * abs(self.slope) / ENDLESS
+
+    def _bend(self, below: float, above: float) -> float:
+        return above - 2.0 * self.J_0 + below

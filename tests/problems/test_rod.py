@@ -116,6 +116,15 @@ def test_any_start_finds_the_film_coefficient_of_a_closed_form(tmp_path: Path) -
     assert found[0] == pytest.approx(H, rel=1e-4)
 
 
+def test_a_plateau_is_no_minimum(tmp_path: Path) -> None:
+    """Where the first step goes to so great a loss of heat that T is that of the surroundings, J is level."""
+    options = f"length=400mm,diameter=12mm,conductivity={K},base=100degC,ambient=20degC,film={1e-3 * H}"
+    (spec,) = problems([f"rod[data={thermocouples(tmp_path, True)},n=200,{options}]"])
+    ended = invert(spec, routes(["adjoint"])[0], Engine())
+    assert ended.end == "stopped: J is level here, p no longer matters to the data - choose another start, or bounds"
+    assert np.exp(ended.p[0]) > 1e6 * H
+
+
 @pytest.mark.parametrize(
     ("unknown", "known"),
     [

@@ -14,7 +14,7 @@ from gradient_routes.bench.studies.options import PROBLEM
 
 DEFAULT = "advection[n=8,data=twin,noise=0.01,alpha=0.0001]"
 OPTIMIZERS = ["lbfgs", "descent"]
-TOLERANCE = "Ends where |dJ/dp|, per natural change of p, is this fraction of its first; of stiffnesses, of 1/2 |d|^2."
+TOLERANCE = "Ends where |dJ/dp|, per natural change of p, is this part of its first, or of 1/2 |d|^2 (stiffness, rod)."
 QUESTION = ("problem", "route", "at", "optimizer")
 
 STUDY = Study(

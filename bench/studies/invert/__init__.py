@@ -14,7 +14,7 @@ from gradient_routes.bench.studies.options import problem_option
 POSITIVES = ["none", "log", "softplus"]
 OPTIMIZERS = ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 OPTIMIZER = "gauss-newton, levenberg-marquardt and trust use d(S u)/dp; descent is for comparison, adam for --minibatch"
-TOLERANCE = "Ends where |dJ/dp|, per natural change of p, is this fraction of its first; of stiffnesses, of 1/2 |d|^2."
+TOLERANCE = "Ends where |dJ/dp|, per natural change of p, is this part of its first, or of 1/2 |d|^2 (stiffness, rod)."
 RAW = "How a raw parameter is kept > 0: its logarithm varies, or the argument of softplus."
 ALPHA_SWEEP = "J minimized at COUNT weights of Phi from LEAST to MOST: the L-curve."
 DRAWS = "The same for N draws of the noise: bias and variance against alpha."
