@@ -1,6 +1,6 @@
 """Every problem by every exact route under loads from 1 to 1e-16: is any wrong gradient called ok?
 
-    python -m benchmarks.loads
+    python -m benchmarks.loads [PART_OF_A_NAME ..]
 
 The reference is a dense solve by NumPy: from 1e-6 on Newton's method on the problem itself, below on the linear problem
 that it goes to, whose u and R_p scale with the load. A row that is not ok may be anything.
@@ -22,8 +22,11 @@ from gradient_routes.bench.api import run
 from gradient_routes.problems.advection import Advection
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
+from gradient_routes.problems.plate import Plate
 from gradient_routes.problems.problem import Array, Problem, Reference
+from gradient_routes.problems.rod import Rod
 from gradient_routes.problems.wrapped import Wrapped
+from gradient_routes.routes.synthetic_data import with_synthetic_data
 
 ROUTES = ("tangent", "adjoint", "complex-step", "implicit-ad", "unrolled-ad")
 LOADS = tuple(10.0**-i for i in range(17))
@@ -81,7 +84,20 @@ def kinds() -> Iterator[Kind]:
     for law in ("neo-hookean", "mooney-rivlin"):
         by_hand = partial(block, law=law, derivatives="hand")
         yield Kind(f"block[n=2,law={law},derivatives=hand]", by_hand, linear)
-    yield Kind("block[n=2,load=follower]", partial(block, load="follower"), linear)
+    yield Kind("block[n=2,load=follower]", lambda load: Block(n=2, traction=0.2 * load, load="follower"), linear)
+
+    def plate(load: float, **options: Any) -> Problem:
+        return Plate(nx=3, ny=2, traction=0.2 * load, **options)
+
+    for kind in ("plane-stress", "plane-strain", "axisymmetric"):
+        linear = partial(plate, law="linear", kind=kind)
+        for law in ("neo-hookean", "linear"):
+            yield Kind(f"plate[kind={kind},law={law}]", partial(plate, law=law, kind=kind), linear, law == "linear")
+
+    def rod(load: float) -> Problem:
+        return with_synthetic_data(Rod(n=4, flux=2e4 * load))
+
+    yield Kind("rod[n=4,flux]", rod, rod, True)
 
 
 def exact(kind: Kind, load: float) -> tuple[Array, float]:
@@ -116,16 +132,25 @@ def judged(kind: Kind, loads: Sequence[float] = LOADS, routes: Sequence[str] = R
             yield about | {"error": error, "wrong": wrong, "reason": row["reason"]}
 
 
-def main() -> int:
-    found = [record for kind in kinds() for record in judged(kind)]
-    wrong = [record for record in found if record["wrong"]]
-    for record in wrong:
-        print("WRONG", *record.values())
+def main(parts: Sequence[str]) -> int:
+    found = []
+    for kind in kinds():
+        if not parts or any(part in kind.name for part in parts):
+            of_kind = list(judged(kind))
+            for record in of_kind:
+                if record["wrong"]:
+                    print("WRONG", *record.values(), flush=True)
+            found += of_kind
+            print(counted(kind.name, of_kind), flush=True)
+    print(counted("all", found))
+    return 1 if any(record["wrong"] for record in found) else 0
+
+
+def counted(name: str, found: Sequence[dict[str, Any]]) -> str:
+    wrong, refused = sum(r["wrong"] for r in found), sum(r["status"] != "ok" for r in found)
     largest = max((r["error"] for r in found if r["status"] == "ok" and r["load"] >= LINEAR), default=0.0)
-    refused = sum(record["status"] != "ok" for record in found)
-    print(f"{len(found)} cases, {refused} not ok, {len(wrong)} wrong under ok; the largest error is {largest:.1e}")
-    return 1 if wrong else 0
+    return f"{name}: {len(found)} cases, {refused} not ok, {wrong} wrong under ok; the largest error is {largest:.1e}"
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))
