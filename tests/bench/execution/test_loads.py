@@ -7,7 +7,9 @@ import pytest
 from benchmarks.loads import ROUTES, Kind, judged, kinds
 
 KINDS = {kind.name: kind for kind in kinds()}
-CHEAP = [name for name in KINDS if not name.startswith(("block", "plate"))] + ["block[n=2,law=mooney-rivlin,derivatives=hand]"]
+CHEAP = [name for name in KINDS if not name.startswith(("block", "plate"))] + [
+    "block[n=2,law=mooney-rivlin,derivatives=hand]"
+]
 
 
 @pytest.mark.parametrize("kind", [KINDS[name] for name in CHEAP], ids=CHEAP)
