@@ -19,6 +19,7 @@ VARIANTS = {
     "grip": {"load": "displacement"},
     "follower": {"load": "follower"},
 }
+COMPLEX = ("congruent", "not congruent", "follower")  # test_materials has those of the laws
 
 
 @pytest.mark.parametrize("name", VARIANTS)
@@ -26,7 +27,7 @@ def test_by_hand_is_by_ad(name: str) -> None:
     hand, ad = (Block(**({"n": 2} | VARIANTS[name]), derivatives=by) for by in ("hand", "ad"))
     p = hand.parameters.start
     u, v = hand.initial(p) + 0.01 * RNG.standard_normal(hand.n_state), RNG.standard_normal(hand.n_state)
-    for at in ((u, p), (u + 1e-3j * v, p + 1e-3j)):
+    for at in ((u, p), (u + 1e-3j * v, p + 1e-3j))[: 2 if name in COMPLEX else 1]:
         same(hand.residual(*at), ad.residual(*at))
         same(hand.tangent(*at) @ v, ad.tangent(*at) @ v)
     if hand.matrix_free:

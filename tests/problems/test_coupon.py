@@ -71,12 +71,8 @@ def test_compressible_curves_are_free_of_stress_across(law: str) -> None:
     assert np.abs(coupon.residual(t - 1.0, truth)).max() < 1e-14
 
 
-# complex kernels of the two other laws of compressible rubber compile for 5 to 20 s
-EXACT = [
-    *((law, "incompressible") for law in RUBBERS),
-    ("neo-hookean", "compressible"),
-    ("mooney-rivlin", "compressible"),
-]
+# complex kernels of the other laws of compressible rubber compile for 2 to 20 s
+EXACT = [*((law, "incompressible") for law in RUBBERS), ("neo-hookean", "compressible")]
 
 
 @pytest.mark.parametrize(("law", "volume"), EXACT)

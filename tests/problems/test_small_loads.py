@@ -23,7 +23,7 @@ VARIANTS = [
     *({"law": law, "derivatives": "hand"} for law in LAWS[:2]),
     {"load": "follower"},
 ]
-TINY = (1e-4, 1e-20)  # every load compiles a block of its own; test_materials has the stresses between them
+TINY = 1e-20  # every load compiles a block of its own; test_materials has the stresses of those between
 
 
 def gradient(t: float, route: Route = adjoint, **options) -> np.ndarray:
@@ -61,11 +61,10 @@ def limit() -> np.ndarray:
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda options: "-".join(options.values()))
 def test_the_gradient_over_the_load_goes_to_that_of_linear_elasticity(options: dict[str, str]) -> None:
-    """At 1e-2, 1e-4 and 1e-20: off by O(load), to 1e-12 where that is nothing."""
+    """Off by O(load), to 1e-12 where that is nothing."""
     nonlinear = relative_error(gradient(1e-2, **options), limit()) / 1e-2
     assert nonlinear < 5.0
-    for load in TINY:
-        assert relative_error(gradient(load, **options), limit()) <= 1.5 * nonlinear * load + 1e-12
+    assert relative_error(gradient(TINY, **options), limit()) <= 1e-12
 
 
 def test_the_gradient_by_jax_keeps_its_digits_at_tiny_loads() -> None:
