@@ -115,5 +115,5 @@ vega: $(READY) ## the library that draws in pages anew, from the vl-convert of c
 	$(BIN)/python -c 'import gzip, vl_convert; open("bench/render/vega.js.gz", "wb").write(gzip.compress(vl_convert.javascript_bundle().encode(), 9, mtime=0))'
 
 clean: ## remove what was installed, built and cached; keep results/
-	rm -rf .venv .venvs build dist docs/_build docs/reference *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	rm -rf .venv .venvs build dist docs/_build docs/reference *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks
 	find . -name __pycache__ -type d -exec rm -rf {} +
