@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import itertools
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -96,6 +97,7 @@ def closure(path: Path, root: Path, top: str | None) -> set[Path]:
     beside where that is None; and those of this project's lower floors.
     """
     found: set[Path] = set()
+    looked: set[str] = set()
     waiting = [path]
     while waiting:
         file = waiting.pop()
@@ -103,7 +105,8 @@ def closure(path: Path, root: Path, top: str | None) -> set[Path]:
             continue
         found.add(file)
         names = imported_names(file, root if file.is_relative_to(root) else HERE)
-        for name in itertools.chain(*map(defined_in, names)):
+        for name in {*itertools.chain(*map(defined_in, names))} - looked:
+            looked.add(name)
             if name.startswith(OURS):
                 waiting += located(name, HERE)
             elif top is None or (name.partition(".")[0] == top != gradient_routes.__name__):
@@ -153,9 +156,9 @@ def defined_in(name: str) -> Iterable[str]:
 
 def located(name: str, root: Path) -> list[Path]:
     """The files a dotted name loads, of those below root: every package's __init__ on the way, and the module."""
-    files: list[Path] = []
-    here = root
-    for part in name.split("."):
-        here = here / part
-        files += [f for f in (here / "__init__.py", here.with_suffix(".py")) if f.is_file()]
-    return [f for f in files if f.parent != HERE / gradient_routes.__name__]
+    files: list[str] = []
+    here = str(root)
+    for part in name.split("."):  # by strings: paths take longer to put together than to look for
+        here = os.path.join(here, part)
+        files += [f for f in (os.path.join(here, "__init__.py"), f"{here}.py") if os.path.isfile(f)]
+    return [path for path in map(Path, files) if path.parent != HERE / gradient_routes.__name__]
