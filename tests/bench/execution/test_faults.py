@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import shell, with_routes
+from forks import Forks
 
 EVIL = '''
 import numpy as np
@@ -166,9 +167,6 @@ def test_huge_and_tiny_moduli_are_judged_or_refused(cli, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("command", "code"),
     [
-        ("routes run --problem bar --route adjoint --no-timing --no-isolate > /dev/full", 1),
-        ("routes run --json --no-store --problem bar --route adjoint --no-timing --no-isolate > /dev/full", 1),
-        ("routes list > /dev/full", 1),
         ("routes run --problem bar --route adjoint --no-timing >&-", 0),
         ("routes run --problem 'bar[n=1|2]' --route adjoint --no-timing 2>&-", 0),
         ("PYTHONIOENCODING=ascii routes run --problem 'bar[data=é.csv]' --route adjoint", 2),
@@ -179,6 +177,17 @@ def test_streams_at_their_limits(command: str, code: int, tmp_path: Path) -> Non
     assert "Traceback" not in done.stderr
     assert done.stderr.count("\n") <= 1
     assert done.returncode == code
+
+
+RUN = ("run", "--problem", "bar", "--route", "adjoint", "--no-timing", "--no-isolate")
+
+
+@pytest.mark.parametrize("words", [RUN, (*RUN, "--json", "--no-store"), ("list",)], ids=["table", "rows", "list"])
+def test_a_full_stdout_is_one_line(words: tuple[str, ...], forks: Forks, tmp_path: Path) -> None:
+    ran = forks.run(tmp_path, *words, stdout="/dev/full")
+    assert "Traceback" not in ran.err
+    assert ran.err.count("\n") <= 1
+    assert ran.code == 1
 
 
 @pytest.mark.parametrize(
@@ -221,7 +230,7 @@ def holds_the_numbers(text: str) -> None:
 TAPES = ("--problem", "bar[n=8|1000]", "--route", "unrolled-ad[iterations=20]", "--route", "adjoint")
 
 
-@pytest.mark.parametrize("columns", ["60", "80", "100"])
+@pytest.mark.parametrize("columns", ["60", "100"])
 def test_no_width_is_too_narrow_for_the_numbers(columns: str, cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     ran = cli("run", "--no-store", "--min-time", "0", *TAPES)

@@ -14,8 +14,8 @@ CHEAP = [name for name in KINDS if not name.startswith(("block", "plate"))] + [
 
 @pytest.mark.parametrize("kind", [KINDS[name] for name in CHEAP], ids=CHEAP)
 def test_no_gradient_that_is_wrong_is_called_ok(kind: Kind) -> None:
-    """The other laws and the decades between: python -m benchmarks.loads."""
-    records = list(judged(kind, (1.0, 1e-8, 1e-16)))
-    assert [record["route"] for record in records] == 3 * list(ROUTES)
+    """The other laws and the decades between: python -m benchmarks.loads; test_routes has loads of 1."""
+    records = list(judged(kind, (1e-8, 1e-16)))
+    assert [record["route"] for record in records] == 2 * list(ROUTES)
     assert [record for record in records if record["wrong"]] == []
     assert [(r["load"], r["route"], r["reason"]) for r in records if r["status"] != "ok"] == []

@@ -71,10 +71,10 @@ def begun(folder: Path) -> Counter[int]:
     return Counter(int(path.name.split("-")[1]) for path in folder.glob("begun-*"))
 
 
-@pytest.mark.parametrize("options", [("--jobs", "2"), ("--no-isolate",)])
-def test_three_runners_at_once_run_every_case_once(folder: Path, options: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(("count", "options"), [(2, ("--jobs", "2")), (3, ("--no-isolate",))])
+def test_runners_at_once_run_every_case_once(folder: Path, count: int, options: tuple[str, ...]) -> None:
     """The one that fails, too. Those with a process at a time are below."""
-    runners = [runner(folder, *options) for _ in range(3)]
+    runners = [runner(folder, *options) for _ in range(count)]
     eventually(lambda: len(begun(folder)) >= 3)
     open_gates(folder)
     done = ended(runners)

@@ -131,7 +131,7 @@ def test_sensitivities_of_the_state_equal_central_differences(cli) -> None:
     np.testing.assert_allclose(table, central_differences(bar, lambda state: state.u), rtol=1e-8, atol=1e-10)
 
 
-@pytest.mark.parametrize("selector", [SELECTED, "block[n=2,unknown=shape,markers=3]"])
+@pytest.mark.parametrize("selector", [SELECTED, "block[n=2,unknown=shape,markers=3,law=linear]"])
 def test_sensitivities_of_the_data_equal_central_differences(cli, selector: str) -> None:
     ran = cli(*RUN, selector, "--route", "tangent", "--sensitivities", "s.npz", "--sensitivities-of", "data",
               "--columns", "5,1-2")  # fmt: skip
