@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
-from gradient_routes.bench.inversion.diagnosis import AT_MINIMUM, MISLED, misled
+from gradient_routes.bench.inversion.diagnosis import MISLED, misled
 from gradient_routes.bench.inversion.history import History
 from gradient_routes.bench.inversion.objective import Objective
 from gradient_routes.bench.inversion.slopes import EPS, ROUNDED, STEPS, Along, descent, examined, size
@@ -34,7 +34,7 @@ def confirmed(objective: Objective, history: History, end: str, tolerance: float
         seen = examined(objective, history.first, descent(history.first))
         if seen.blame == "gradient":
             return misled("at the start its slope along the steepest descent", seen.slopes)
-    if not end.startswith((CONVERGED, AT_MINIMUM)):
+    if not end.startswith(CONVERGED):
         return end
     before = objective.forward_solves
     remarks, around = [], [Beside(objective, v) for v in directions(objective)]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from gradient_routes.bench.inversion.objective import Objective
 from gradient_routes.bench.inversion.slopes import EPS, ROUNDED, Slopes, descent, examined
 
-AT_MINIMUM = "J cannot be told apart from its minimum"
+AT_MINIMUM = "converged to rounding: J cannot be told apart from its minimum"
 MISLED = "gradient is not that of J"
 LOOSE = 1e-6  # tolerance of a forward solve above which it may disturb J
 
@@ -37,10 +37,13 @@ def explained(objective: Objective) -> str:
             f"the error of {objective.route.name} hides the slope of J ({found.promised:.4g} by the gradient,"
             f" {found.found:.4g} by differences of J) - use a more accurate route"
         )
-    if found.noise > ROUNDED * EPS * abs(J) and found.hidden:
+    rounding = ROUNDED * EPS * abs(J)
+    if found.to_gain <= rounding:
+        return AT_MINIMUM
+    if found.noise > rounding and found.hidden:
         return f"noise of J, about {found.noise:.2g}, hides a slope of {-found.promised:.2g}{_if_loose(objective)}"
     if found.hidden or J == 0.0 or abs(found.promised) < math.sqrt(EPS) * objective.slope_scale:
-        return f"{AT_MINIMUM}: what is left of the slope is rounding"
+        return AT_MINIMUM
     return f"no step was found, though J falls by {-found.promised:.2g} as the gradient says - use another optimizer"
 
 

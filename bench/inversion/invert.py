@@ -173,7 +173,7 @@ def invert(
     with redirect_stdout(sys.stderr), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The line search algorithm")  # SciPy's: `end` tells more
         try:
-            found = objective.start(p)
+            found = objective.start(p, None if start is None else p_0)
             doubt = objective.doubt()
             history.take(found, "; ".join(filter(None, (says, doubt))) or None)
             if objective.slope_0 == 0.0:

@@ -10,7 +10,6 @@ import numpy as np
 
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.inversion.diagnosis import AT_MINIMUM
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
@@ -32,7 +31,7 @@ class Point:
     @property
     def converged(self) -> bool:
         """Whether it is a minimum, to the tolerance or to rounding; the curve consists of minima."""
-        return self.inversion.end.startswith(("converged", AT_MINIMUM))
+        return self.inversion.end.startswith("converged")
 
     @property
     def row(self) -> Row:

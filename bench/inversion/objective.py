@@ -69,19 +69,25 @@ class Objective:
         self.begun = time.perf_counter()
         self.tried: list[Evaluation] = []  # since the last accepted step
         self.J_0, self.slope_0 = 1.0, 0.0  # J and |dJ/dx| at the start
-        self.slope_scale = 0.0  # what |dJ/dx| is called small against, for a natural change of p
+        self.slope_scale, self.slope_scale_is = 0.0, ""  # what |dJ/dx| is called small against, for natural changes
         self.evaluations = 0
         self._options = options
         self._gradient: Any = None
         self._accepted: Evaluation | None = None
 
-    def start(self, p: Array) -> Evaluation:
-        """The first evaluation. Raises what the route raises there."""
+    def start(self, p: Array, p_0: Array | None = None) -> Evaluation:
+        """The first evaluation. Raises what the route raises there.
+
+        p_0  whose slope others are compared with where p, from an inversion before, has hardly any left [p]
+        """
         options = self.route.resolve(self.model, p, **self._options)
         self._gradient = self.route.prepare(self.model, p, **options)
         first = self._accepted = self._evaluate(self.variables.x(p))
         self.J_0, self.slope_0 = abs(first.J) or 1.0, norm2(first.by_x)
-        self.slope_scale = size_of_data(self.problem, p) or self.slope_0
+        self.slope_scale, self.slope_scale_is = size_of_data(self.problem, p), "1/2 |d|^2"
+        if not self.slope_scale:
+            before = 0.0 if p_0 is None else norm2(self._evaluate(self.variables.x(p_0)).by_x)
+            self.slope_scale, self.slope_scale_is = before or self.slope_0, "that at the start"
         return first
 
     def with_solver(self, solver: Solver) -> Objective:

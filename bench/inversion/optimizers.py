@@ -54,8 +54,7 @@ def flat(objective: Objective, found: Evaluation, limits: Limits) -> bool:
 
 
 def converged(objective: Objective, limits: Limits) -> str:
-    of = "that at the start" if objective.slope_scale == objective.slope_0 else "1/2 |d|^2"
-    return f"converged: |dJ/dp| is {limits.tolerance:g} of {of}"
+    return f"converged: |dJ/dp| is {limits.tolerance:g} of {objective.slope_scale_is}"
 
 
 def minimized(objective: Objective, history: History, limits: Limits, options: Any, **method: Any) -> str:

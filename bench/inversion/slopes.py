@@ -32,6 +32,7 @@ class Slopes:
     found      by central differences, with its uncertainty
     noise      of J, from second differences over tiny steps
     left, right  one-sided slopes
+    curvature  second derivative, absolute
     kink       whether these differ in the limit
     edge       why J is not defined beside the point; None where it is
     """
@@ -43,6 +44,7 @@ class Slopes:
     noise: float
     left: float
     right: float
+    curvature: float
     kink: bool
     edge: str | None
 
@@ -55,6 +57,11 @@ class Slopes:
         """Whether they disagree where J is smooth, by more than is in the nature of the route."""
         smooth = self.edge is None and not self.kink
         return smooth and self.disagree and abs(self.promised - self.found) > self.natural
+
+    @property
+    def to_gain(self) -> float:
+        """By how much a Newton step along the direction would lower J."""
+        return 0.5 * self.promised**2 / self.curvature if self.curvature else math.inf
 
     @property
     def hidden(self) -> bool:
@@ -102,7 +109,7 @@ def slopes(objective: Objective, at: Evaluation, v: Array) -> Slopes:
     noise = max(float(np.abs(np.diff(near, 2)).max()), 8.0 * EPS * abs(at.J), resolution)
     if not (np.isfinite([below, above]).all() and math.isfinite(noise)):
         edge = J.edge or "J is not finite"
-        return Slopes(promised, math.inf, math.nan, math.inf, noise, math.nan, math.nan, False, edge)
+        return Slopes(promised, math.inf, math.nan, math.inf, noise, math.nan, math.nan, math.nan, False, edge)
     central, gap = (above - below) / (2.0 * h), (above - 2.0 * here + below) / h  # gap: right less left slope
     uncertain = noise / h + np.abs(np.diff(central, prepend=math.inf))
     least = np.maximum(DISAGREE * abs(promised), 10.0 * noise / h[2:])
@@ -113,9 +120,8 @@ def slopes(objective: Objective, at: Evaluation, v: Array) -> Slopes:
     curvature = abs(float(gap[best] / h[best]))
     steepest = objective.slope_0 * norm2(v)
     natural = max(PRECISE * steepest, objective.route.accuracy * (steepest + curvature))
-    return Slopes(
-        promised, natural, float(central[best]), float(uncertain[best]), noise, float(left), float(right), kink, None
-    )
+    found, off = float(central[best]), float(uncertain[best])
+    return Slopes(promised, natural, found, off, noise, float(left), float(right), curvature, kink, None)
 
 
 def _resolution(h: Array, changes: Array, slope: float, J: float) -> float:

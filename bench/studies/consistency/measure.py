@@ -16,7 +16,6 @@ from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.study import Found, Kept, Say
 from gradient_routes.bench.execution.references import norm2
-from gradient_routes.bench.inversion.diagnosis import AT_MINIMUM
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.bench.inversion.optimizers import Limits, Name
 from gradient_routes.bench.studies.consistency.columns import CONSISTENCY
@@ -162,7 +161,7 @@ def _error(g: Array, true: Array) -> float | None:
 def outcome(found: Inversion) -> str:
     """What the optimizer believes; where rounding ends it at a minimum, it has converged."""
     says = found.stop.says
-    if says.startswith(("converged", AT_MINIMUM)):
+    if says.startswith("converged"):
         return "converged"
     return "not converged" if says.startswith("not converged") else "stalled"
 

@@ -242,9 +242,11 @@ def test_a_zero_gradient_at_the_start_is_the_end() -> None:
         assert np.isfinite(found.p).all()
 
 
-def test_a_minimum_reached_to_rounding_is_not_called_inconsistent() -> None:
-    found = inverted("bar[noise=1e-2,alpha=1e-2]", limits=Limits(300, 0.0))
-    assert "rounding" in found.end
+@pytest.mark.parametrize("problem", ["bar[noise=1e-2,alpha=1e-2]", "bar[n=3,sensors=3,noise=0.01,alpha=1e-3]"])
+def test_a_minimum_reached_to_rounding_is_one(problem: str) -> None:
+    """In the second J is 1e-6: over the tiny steps that show noise, its curvature exceeds its rounding."""
+    found = inverted(problem, limits=Limits(300, 0.0))
+    assert found.end.startswith("converged to rounding")
 
 
 def test_a_diverging_run_stops_with_the_reason(tmp_path: Path) -> None:
