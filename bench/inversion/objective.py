@@ -56,6 +56,18 @@ def size_of_data(problem: Problem, p: Array) -> float:
     return 0.0 if seen is None else 0.5 * float(np.sum((seen.data - seen.predicted) ** 2))
 
 
+def noise_level(problem: Problem, p: Array) -> float:
+    """1/2 sigma^2 m, the misfit that noise alone leaves, m without what is eliminated; 0 where noise is not known.
+
+    Neither depends on the state.
+    """
+    seen = observed(problem, p)
+    if seen is None:
+        return 0.0
+    m = len(seen.data) - (0 if seen.modes is None else seen.modes.shape[1])
+    return 0.5 * seen.sigma**2 * m
+
+
 class Objective:
     """x -> (J / J_0, dJ/dx / J_0) by a route, J_0 the value at the start: numbers near one.
 

@@ -8,11 +8,12 @@ from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.inversion.invert import Inversion
-from gradient_routes.bench.inversion.lcurve import Point
+from gradient_routes.bench.inversion.lcurve import CLOSE, Point
 from gradient_routes.bench.inversion.tradeoff import Trade
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal.plot import Series, plot
 
+FLAT = 0.99  # of misfit / noise, by the last alpha: it falls no further
 NO_CORNER = (
     "no corner: the curve bends the other way throughout - with as many parameters as data, the misfit falls on below"
     " the noise"
@@ -64,9 +65,25 @@ def remarks(points: Sequence[Point]) -> list[Text]:
         lines.append(Text(NO_CORNER, style="dim"))
     if all(point.discrepancy is None for point in points):
         lines.append(Text("no discrepancy principle: the noise of the data is not known", style="dim"))
-    elif not any("discrepancy" in (point.chosen or "") for point in points):
-        lines.append(Text("no alpha meets the data to their noise: begin the sweep lower", style="dim"))
+    elif said := _not_met(points):
+        lines.append(Text(said, style="dim"))
     return lines
+
+
+def _not_met(points: Sequence[Point]) -> str:
+    """Why no alpha of the sweep is that of the discrepancy principle."""
+    known = [point for point in points if point.converged and point.discrepancy is not None]
+    if not known:
+        return "no discrepancy principle: no inversion of the sweep has converged - give more --iterations"
+    first, last = (float(point.discrepancy or 0.0) for point in (known[0], known[-1]))
+    if not known[-1].meets_noise:
+        falls = len(known) > 1 and last < FLAT * float(known[-2].discrepancy or 0.0)
+        why = "begin the sweep lower" if falls else "no smaller alpha will: the model does not explain the data"
+        least = f"misfit / noise is {last:.3g} at {known[-1].inversion.alpha:g}"
+        return f"no alpha meets the data to their noise: {least}; {why}"
+    if known[0].meets_noise and first < 1.0 - CLOSE:
+        return f"every alpha meets the data to their noise, the largest to {first:.3g} of it: end the sweep higher"
+    return ""
 
 
 def trades(found: Sequence[Trade]) -> Table:

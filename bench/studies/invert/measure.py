@@ -13,6 +13,7 @@ from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.status import FOREIGN
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
+from gradient_routes.bench.inversion.discrepancy import between
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.bench.inversion.lcurve import Point, l_curve, minima
 from gradient_routes.bench.inversion.minibatch import minibatched
@@ -141,15 +142,15 @@ class Run:
     def _show(self, value: object) -> None:
         self.say(Found(value))
 
-    def _until_it_ends(self, each: Iterable[One]) -> list[One]:
-        """All of them, or those before an interrupt or a failure. Raises either where it has none."""
+    def _until_it_ends(self, each: Iterable[One], least: int = 1) -> list[One]:
+        """All of them, or those before an interrupt or a failure. Raises either where there are fewer than `least`."""
         done: list[One] = []
         try:
             for found in each:
                 done.append(found)  # not all at once: what has come stays
         except (KeyboardInterrupt, *FOREIGN) as failure:
             self.failure = failure
-            if not done:
+            if len(done) < least:
                 raise
         return done
 
@@ -168,7 +169,11 @@ class Run:
             self._keep("tradeoff", [trade.row for trade in trades])
             self.say(Found(Trades(trades)))
             return
-        points = l_curve(self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at))))
+        swept = self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at)))
+        points = l_curve(swept)
+        if self.failure is None:
+            further = self._swept(between(self.spec, route, self.engine, points, self.at))
+            points = l_curve(swept, self._until_it_ends(further, least=0))
         best = next((point for point in points if point.chosen), points[-1]).inversion
         self._tell(best.made)
         self._warn(best)
