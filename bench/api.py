@@ -175,6 +175,7 @@ def invert(
     tolerance: float = 1e-9,
     positive: Positive = "none",
     rate: float = 0.1,
+    stop_at_noise: bool = False,
     **solver: Unpack[SolverOptions],
 ) -> Inversion:
     """Minimize J(p) = 1/2 |S u(p) - d|^2 + alpha Phi(p), from `at`, with any route as the engine. `routes invert`.
@@ -184,6 +185,7 @@ def invert(
     tolerance   ends where |dJ/dp|, per natural change of p, is so much of its first, or of 1/2 |d|^2 (stiffness, rod)
     positive    "log" or "softplus": what keeps a raw parameter > 0
     rate        of adam's steps, in natural changes of p
+    stop_at_noise  end at the first step that meets the data to their noise (discrepancy principle)
 
     Returns an Inversion: `p` and `gradient` (n_p,) at the end, `iterates` with J, misfit and the solves paid so far,
     `truth` where it is known, `end`: why it stopped, `misled`: whether the gradient is not that of J.
@@ -209,7 +211,7 @@ def invert(
             f"invert: iterations={iterations}, tolerance={tolerance:g}, rate={rate:g} - give at least one iteration, a"
             " tolerance below 1 and a rate > 0"
         )
-    engine = Engine(optimizer, Limits(iterations, tolerance, rate), solver_of(**solver), positive)
+    engine = Engine(optimizer, Limits(iterations, tolerance, rate, stop_at_noise), solver_of(**solver), positive)
     return minimize(_one(_problems(problem), problem), _one(_routes(route), route), engine, at)
 
 

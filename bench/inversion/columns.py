@@ -25,6 +25,8 @@ INVERSION = (
     Column("adjoint_solves", "INTEGER", "1", "linearized and transposed solves so far, Newton steps left out"),
     Column("seconds", "REAL", "s", "so far"),
     Column("distance", "REAL", "1", "|p - p_true| / |p_0 - p_true|, where the truth is known"),
+    Column("discrepancy", "REAL", "1", "|S u - d| / (sigma sqrt(m)): 1 where the data are met to their noise"),
+    Column("chosen", "TEXT", "", "discrepancy: the first step that meets them so, where that principle stops"),
     Column("ending_solves", "INTEGER", "1", "forward solves after the last step, to explain or to confirm the end"),
     Column("says", "TEXT", "", "what happened there: a stall, a step out of the domain, why it stopped"),
 )

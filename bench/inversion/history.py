@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.error_bar import ErrorBar
-from gradient_routes.bench.inversion.objective import Evaluation, Objective
+from gradient_routes.bench.inversion.objective import Evaluation, Objective, noise_level
 from gradient_routes.bench.inversion.slopes import EPS, ROUNDED
 from gradient_routes.problems.problem import Array
 
@@ -28,6 +29,8 @@ class Iterate:
     adjoint_solves: int
     seconds: float
     distance: float | None
+    discrepancy: float | None
+    chosen: str | None
     says: str | None = None
 
 
@@ -40,6 +43,8 @@ class History:
 
     truth, p_0  for |p - p_true| / |p_0 - p_true|
     offset      iterations of the run that this one resumes
+    noise       the misfit of the noise of the data, 0 where that is not known
+    met         whether the misfit has come down to it: what the discrepancy principle chooses is the first such step
     ratios      of the changes of J that the gradient promises, by the trapezoidal rule, to the actual ones
     """
 
@@ -55,6 +60,7 @@ class History:
 
     def __post_init__(self) -> None:
         self.error_bar = ErrorBar(self.objective)
+        self.noise, self.met = noise_level(self.objective.problem, self.p_0), False
 
     def take(self, found: Evaluation, says: str | None = None) -> None:
         """Record an accepted step, and whether steps before it left the domain of J."""
@@ -63,16 +69,23 @@ class History:
         if outside and says is None:
             says = f"a step was shortened: {outside[0]}"
         moved = float(np.linalg.norm(found.x - objective.accepted.x)) if self.iterates else None
+        misfit, regularization = objective.misfit(found)
+        over_noise = math.sqrt(max(misfit, 0.0) / self.noise) if self.noise else None
+        first_met = over_noise is not None and over_noise <= 1.0 and not self.met
+        self.met = self.met or first_met
         iterate = Iterate(
             self.offset + len(self.iterates),
             found.J,
-            *objective.misfit(found),
+            misfit,
+            regularization,
             norm2(found.gradient),
             moved,
             objective.forward_solves,
             objective.adjoint_solves,
             objective.seconds,
             self._distance(found.p),
+            over_noise,
+            "discrepancy" if first_met else None,
             says,
         )
         self.first, self.last = self.first or found, found

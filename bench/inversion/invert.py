@@ -20,10 +20,18 @@ from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.fit import Fit, fit
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
-from gradient_routes.bench.inversion.objective import Evaluation, Objective, observed
-from gradient_routes.bench.inversion.optimizers import Limits, Name, Stopped, converged, flat, optimizer
+from gradient_routes.bench.inversion.objective import Evaluation, Objective, noise_level, observed
+from gradient_routes.bench.inversion.optimizers import (
+    Limits,
+    Name,
+    Stopped,
+    converged,
+    flat,
+    optimizer,
+    stopped_at_noise,
+)
 from gradient_routes.bench.inversion.variables import Positive, Variables
-from gradient_routes.problems.errors import OUTSIDE, RoutesError
+from gradient_routes.problems.errors import OUTSIDE, InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
 from gradient_routes.routes.measured_start import fitted_factor, small_strain_factor
 from gradient_routes.routes.model import Model
@@ -168,6 +176,7 @@ def invert(
         raise RoutesError(f"invert: {objection} - choose another route")
     variables = Variables.of(problem.parameters, p, engine.positive, problem.name)
     objective = Objective(problem, route.route, route.options, engine.solver, variables)
+    check_noise(problem, engine.limits)
     history = History(objective, problem.truth(), p_0, watch, offset=offset)
     interrupted = False
     with redirect_stdout(sys.stderr), np.errstate(all="ignore"), warnings.catch_warnings():
@@ -176,7 +185,9 @@ def invert(
             found = objective.start(p, None if start is None else p_0)
             doubt = objective.doubt()
             history.take(found, "; ".join(filter(None, (says, doubt))) or None)
-            if objective.slope_0 == 0.0:
+            if engine.limits.at_noise and history.met:
+                end = stopped_at_noise(history)
+            elif objective.slope_0 == 0.0:
                 end = "converged: dJ/dp is 0 at the start"
             elif flat(objective, found, engine.limits):
                 end = converged(objective, engine.limits)
@@ -229,6 +240,12 @@ def invert(
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
         None if interrupted else fit(problem, last, engine.solver),
     )
+
+
+def check_noise(problem: Problem, limits: Limits) -> None:
+    """Raises InputError where the inversion should stop at a noise that is not known."""
+    if limits.at_noise and not noise_level(problem, problem.parameters.start):
+        raise InputError(f"{problem.name}: --stop-at-noise, but the noise of its data is not known - give noise=")
 
 
 def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Problem, Array, str | None]:

@@ -18,16 +18,22 @@ Name = Literal["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent
 DIVERGED = 1e3  # J, in J_0, above which a run diverges
 UNBOUNDED = 1e6  # -J, in J_0, above which J has no lower bound
 MEMORY = 20  # pairs of steps and gradient changes that L-BFGS keeps
+FAR_BELOW = 0.5  # of the noise: a step has fitted most of it
+AT_NOISE = "stopped at the noise"
 SPENT = 1  # status of SciPy's minimizers: the iterations are used up; any other end is a failed line search
 
 
 @dataclass(frozen=True)
 class Limits:
-    """iterations at most; tolerance on |dJ/dx| relative to the start or to 1/2 |d|^2; rate of the steps of adam."""
+    """iterations at most; tolerance on |dJ/dx| relative to the start or to 1/2 |d|^2; rate of the steps of adam.
+
+    at_noise  whether to end at the first step that meets the data to their noise
+    """
 
     iterations: int = 200
     tolerance: float = 1e-9
     rate: float = 0.1
+    at_noise: bool = False
 
 
 class Stopped(Exception):
@@ -43,6 +49,8 @@ def accept(objective: Objective, history: History, limits: Limits, x: Array) -> 
         raise Stopped(f"J falls without bound: J = {found.J:.3g} after {objective.J_0:.3g} - it is no sum of squares")
     if found.J > DIVERGED * objective.J_0:
         raise Stopped(f"diverging: J = {found.J:.3g} is {found.J / objective.J_0:.3g} times that of the start")
+    if limits.at_noise and history.met:
+        raise Stopped(stopped_at_noise(history))
     if flat(objective, found, limits):
         raise Stopped(converged(objective, limits))
     if history.error_bar.hides(found):
@@ -55,6 +63,14 @@ def flat(objective: Objective, found: Evaluation, limits: Limits) -> bool:
 
 def converged(objective: Objective, limits: Limits) -> str:
     return f"converged: |dJ/dp| is {limits.tolerance:g} of {objective.slope_scale_is}"
+
+
+def stopped_at_noise(history: History) -> str:
+    met = history.iterates[-1].discrepancy or 0.0
+    said = f"{AT_NOISE}: the data are met to {met:.3g} of it (discrepancy principle)"
+    return (
+        said if met > FAR_BELOW else f"{said}; the last step was long - take --optimizer lbfgs, or weigh Phi by alpha="
+    )
 
 
 def minimized(objective: Objective, history: History, limits: Limits, options: Any, **method: Any) -> str:

@@ -20,6 +20,7 @@ ALPHA_SWEEP = "J minimized at COUNT weights of Phi from LEAST to MOST: the L-cur
 DRAWS = "The same for N draws of the noise: bias and variance against alpha."
 MINIBATCH = "Gradients of K load cases at a time, drawn at random, for adam."
 RATE = "Of adam's steps, in natural changes of p."
+AT_NOISE = "End at the first step that meets the data to their noise: the discrepancy principle for iterations."
 RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")
 
@@ -58,6 +59,7 @@ STUDY = Study(
             "--alpha-sweep", type=(POSITIVE, POSITIVE, Whole(2, 10_000)), metavar="LEAST MOST COUNT", help=ALPHA_SWEEP
         ),
         click.option("--draws", type=Whole(2), metavar="N", help=DRAWS),
+        click.option("--stop-at-noise", is_flag=True, help=AT_NOISE),
         click.option("--minibatch", type=COUNT, metavar="K", help=MINIBATCH),
         click.option("--rate", type=POSITIVE, default=0.1, show_default=True, help=RATE),
         click.option("--seed", type=SEED, default=0, show_default=True, help="Of the minibatches."),
@@ -68,7 +70,7 @@ STUDY = Study(
         Rule(("rate",), lambda given: given["optimizer"] == "adam", "is of --optimizer adam"),
         Rule(("seed",), lambda given: given["minibatch"] is not None, "is of --minibatch"),
         Rule(
-            ("resume", "minibatch"),
+            ("resume", "minibatch", "stop_at_noise"),
             lambda given: given["alpha_sweep"] is None,
             "is of a single inversion, not of an --alpha-sweep",
         ),

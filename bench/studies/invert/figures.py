@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.render.figure import Axis, Figure, Section
+from gradient_routes.bench.render.figure import Axis, Figure, Guide, Section
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.picking import each, grouped, real, tabulate, text
 from gradient_routes.bench.render.source import Source
@@ -50,7 +50,12 @@ def history(rows: Sequence[Row]) -> Figure | None:
         "history",
         "Misfit, step by step",
         says(rows),
-        tabulate("inversion", rows, f"{columns} forward_solves adjoint_solves seconds distance says", REACHED[:1]),
+        tabulate(
+            "inversion",
+            rows,
+            f"{columns} forward_solves adjoint_solves seconds distance discrepancy chosen says",
+            REACHED[:1],
+        ),
         "line",
         x=(
             Axis("iteration", "iteration"),
@@ -63,10 +68,13 @@ def history(rows: Sequence[Row]) -> Figure | None:
             Axis("objective", "J", "unit of J", scale="log"),
             Axis("gradient_norm", "|dJ/dp|", "unit of J / p", scale="log"),
             Axis("distance", "distance to the truth, relative", scale="log"),
+            Axis("discrepancy", "misfit against noise |Su − d| / (σ√m)", scale="log"),
         ),
         series=each(rows, "run"),
         panels=each(rows, "problem"),
         routes=True,
+        guides=(Guide("y", 1.0, "noise", column="discrepancy"),),
+        note="chosen",
     )
 
 

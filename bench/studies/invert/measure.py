@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,9 +15,11 @@ from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
 from gradient_routes.bench.cases.status import FOREIGN
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.inversion.discrepancy import between
-from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
+from gradient_routes.bench.inversion.history import Iterate
+from gradient_routes.bench.inversion.invert import Engine, Inversion, check_noise, invert
 from gradient_routes.bench.inversion.lcurve import Point, l_curve, minima
 from gradient_routes.bench.inversion.minibatch import minibatched
+from gradient_routes.bench.inversion.objective import noise_level
 from gradient_routes.bench.inversion.one_shot import OneShot, of_problem
 from gradient_routes.bench.inversion.optimizers import Limits, Name
 from gradient_routes.bench.inversion.resumed import last_estimate
@@ -33,10 +36,19 @@ Start = tuple[Array | None, int]  # p and the iterations before it
 
 @dataclass(frozen=True)
 class Begun:
-    """An inversion begins; `truth` tells whether the true p is known."""
+    """An inversion begins; `truth` tells whether the true p is known, `noise` whether steps are compared with it."""
 
     title: str
     truth: bool
+    noise: bool
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A step of it."""
+
+    step: Iterate
+    noise: bool
 
 
 @dataclass(frozen=True)
@@ -80,6 +92,7 @@ def run(
     minibatch: int | None,
     rate: float,
     seed: int,
+    stop_at_noise: bool,
     resume: bool,
     solver: Solver,
     kept: Path | None,
@@ -88,7 +101,7 @@ def run(
     _check(iterations, tolerance, rate, draws, alpha_sweep, minibatch, optimizer)
     if resume and kept is None:
         raise InputError("--resume: reads a store, with --no-store there is none - leave one of them out")
-    engine = Engine(optimizer, Limits(iterations, tolerance, rate), solver, positive)
+    engine = Engine(optimizer, Limits(iterations, tolerance, rate, stop_at_noise), solver, positive)
     asked = Run(say, one_problem(selector), case.routes(routes), engine, at)
     if alpha_sweep is None:
         asked.each(kept if resume else None, minibatch, seed)
@@ -129,9 +142,12 @@ class Run:
         for route, (p, offset) in zip(self.routes, starts, strict=True):
             run = None if minibatch is None else minibatched(problem, route, self.engine, minibatch, seed)
             Variables.of(problem.parameters, problem.parameters.start, self.engine.positive, problem.name)
+            check_noise(problem, self.engine.limits)
             title = f"{self.spec.selector} by {route.name}, {self.engine.optimizer}"
-            self.say(Found(Begun(title, problem.truth() is not None)))
-            found = invert(self.spec, route, self.engine, self.at, p, self._show, problem, run, offset)
+            noise = problem.alpha == 0.0 and noise_level(problem, problem.parameters.start) > 0.0
+            self.say(Found(Begun(title, problem.truth() is not None, noise)))
+            show = partial(self._show, noise)
+            found = invert(self.spec, route, self.engine, self.at, p, show, problem, run, offset)
             yield found
             self.misled = self.misled or found.misled or found.unexplained
             self.say(Found(Ended(found, one_shot)))
@@ -139,8 +155,8 @@ class Run:
             if found.interrupted:
                 raise KeyboardInterrupt
 
-    def _show(self, value: object) -> None:
-        self.say(Found(value))
+    def _show(self, noise: bool, step: Iterate) -> None:
+        self.say(Found(Taken(step, noise)))
 
     def _until_it_ends(self, each: Iterable[One], least: int = 1) -> list[One]:
         """All of them, or those before an interrupt or a failure. Raises either where there are fewer than `least`."""

@@ -13,12 +13,13 @@ from rich.text import Text
 from gradient_routes.bench.inversion.history import Iterate
 from gradient_routes.bench.inversion.invert import Inversion
 from gradient_routes.bench.inversion.one_shot import OneShot
+from gradient_routes.bench.inversion.optimizers import AT_NOISE
 from gradient_routes.bench.render.format import number, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
-from gradient_routes.bench.studies.invert import lcurve_view
-from gradient_routes.bench.studies.invert.measure import Begun, Compared, Ended, LCurve, Trades
+from gradient_routes.bench.studies.invert import lcurve_view, march_view
+from gradient_routes.bench.studies.invert.measure import Begun, Compared, Ended, LCurve, Taken, Trades
 from gradient_routes.problems.problem import Array
 
 WIDEST = 100  # columns of a plot
@@ -38,11 +39,11 @@ def show(out: Console, found: object, plots: bool = True) -> None:
     """What `routes invert` finds, as it comes."""
     width = min(out.width, WIDEST)
     match found:
-        case Begun(title, truth):
+        case Begun(title, truth, noise):
             out.print(title, style="bold", soft_wrap=not out.is_terminal)
-            heading(out, truth)
-        case Iterate():
-            line(out, found)
+            heading(out, truth, noise)
+        case Taken(step, noise):
+            line(out, step, noise)
         case Ended(inversion, one_shot):
             ended(out, inversion, one_shot)
         case Inversion() if out.is_terminal:
@@ -51,6 +52,8 @@ def show(out: Console, found: object, plots: bool = True) -> None:
             out.print()
             if plots:
                 out.print(history(inversions, width))
+                if march_view.into_noise(inversions[-1]):
+                    out.print(march_view.march(inversions[-1], width))
             tables.show(out, costs(inversions))
             tables.say(out, LEGEND, "dim")
             _estimates(out, inversions[-1])
@@ -83,27 +86,33 @@ def _estimates(out: Console, found: Inversion) -> None:
         out.print(picture)
 
 
-def heading(out: Console, truth: bool) -> None:
-    out.print(Text(HEADINGS + (f" {'off':>7}" if truth else ""), style="bold"))
+def heading(out: Console, truth: bool, noise: bool = False) -> None:
+    names = HEADINGS.replace("alpha Phi", f"{'/ noise':>9}") if noise else HEADINGS
+    out.print(Text(names + (f" {'off':>7}" if truth else ""), style="bold"))
 
 
-def line(out: Console, step: Iterate) -> None:
-    """One iteration, as soon as it is known."""
+def line(out: Console, step: Iterate, noise: bool = False) -> None:
+    """One iteration, as soon as it is known; without Phi its column is the misfit against the noise."""
+    fourth = step.discrepancy if noise and step.discrepancy is not None else step.regularization
     off = "" if step.distance is None else f" {step.distance:>7.3g}"
     text = (
-        f"{step.iteration:>4} {step.objective:>9.4g} {step.misfit:>9.4g} {step.regularization:>9.3g}"
+        f"{step.iteration:>4} {step.objective:>9.4g} {step.misfit:>9.4g} {fourth:>9.3g}"
         f" {step.gradient_norm:>9.3g} {number(step.step_length) or '':>8} {step.forward_solves:>4}"
         f" {step.adjoint_solves:>4} {seconds(step.seconds):>8}{off}"
     )
     out.print(Text(text))
+    if step.chosen:
+        out.print(Text(f"     {step.chosen}: the data are met to their noise"))
     if step.says:
         out.print(Text(f"     {step.says}", style="yellow"), soft_wrap=not out.is_terminal)
 
 
 def ended(out: Console, found: Inversion, one_shot: float | None = None) -> None:
     """Why it stopped, and how it stands to the one-shot answer."""
-    well = found.end.startswith("converged")
+    well = found.end.startswith(("converged", AT_NOISE))
     out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=not out.is_terminal)
+    if said := march_view.says(found):
+        out.print(Text(said), soft_wrap=not out.is_terminal)
     out.print(Text(found.scaled, style="dim"), soft_wrap=not out.is_terminal)
     if one_shot is not None:
         above = found.iterates[-1].objective / one_shot - 1.0 if one_shot > 0.0 else 0.0
