@@ -97,7 +97,8 @@ def refuse_given(names: Iterable[str], why: str) -> None:
     context = click.get_current_context()
     for name in names:
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise InputError(f"--{name.replace('_', '-')}: {why} - leave it out")
+            option = next(o for o in context.command.params if o.name == name)
+            raise InputError(f"{max(option.opts, key=len)}: {why} - leave it out")
 
 
 def checked(budget: float) -> float:

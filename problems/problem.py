@@ -224,6 +224,7 @@ class Problem:
     line_search  False where full Newton steps converge from anywhere, R being convex with R_u^{-1} >= 0 (Ortega &
                Rheinboldt 1970, 13.3.4) or by an active-set method: halving steps would hinder it
     affine     u is an affine function of p: R is affine in u and p is a load
+    affine_at_rest  it is where u is small: p is a load, and u = 0 without it
     regularization  the prior, whose weight is alpha; None where there can be none
     stop       of a state that meets an obstacle: the contact law, None where there is none
     typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
@@ -246,6 +247,7 @@ class Problem:
     matrix_free: bool = False
     line_search: bool = True
     affine: bool = False
+    affine_at_rest: bool = False
     regularization: Prior | None = None
     stop: Stop | None = None
     typical: int | None = None

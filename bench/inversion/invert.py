@@ -20,6 +20,7 @@ from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.fit import Fit, fit
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
+from gradient_routes.bench.inversion.linear_regime import LinearRegime, at_rest
 from gradient_routes.bench.inversion.objective import Evaluation, Objective, noise_level, observed
 from gradient_routes.bench.inversion.optimizers import (
     Limits,
@@ -76,6 +77,7 @@ class Inversion:
     ending_solves  forward solves after the last step, to explain or to confirm the end
     scaled   the units of the optimizer's variables; warning: what is wrong with them
     fit      residuals and error bars, where data were measured
+    regime   what the problem linearized at u = 0 reads there, where noise is known and R nonlinear in u
     """
 
     problem: str
@@ -102,6 +104,7 @@ class Inversion:
     warning: str | None = field(repr=False)
     scaled: str = field(repr=False)
     fit: Fit | None = field(default=None, repr=False)
+    regime: LinearRegime | None = field(default=None, repr=False)
 
     @property
     def misled(self) -> bool:
@@ -112,6 +115,10 @@ class Inversion:
     def unexplained(self) -> bool:
         """Whether the model does not explain the data: residuals exceed their noise, or the data themselves."""
         return self.fit is not None and self.fit.residuals.unexplained
+
+    @property
+    def linear_regime(self) -> str | None:
+        return None if self.regime is None else self.regime.described("the problem linearized at u = 0")
 
     @property
     def forward_solves(self) -> int:
@@ -129,7 +136,7 @@ class Inversion:
         rows = [self.shared | asdict(iterate) | {"ending_solves": None} for iterate in self.iterates]
         rows[last]["ending_solves"] = self.ending_solves
         doubt = self.fit.residuals.described if self.fit is not None and self.unexplained else None
-        rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end, doubt)))
+        rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end, self.linear_regime, doubt)))
         return {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
 
     def _estimate(self, i: int) -> Row:
@@ -187,9 +194,9 @@ def invert(
             history.take(found, "; ".join(filter(None, (says, doubt))) or None)
             if engine.limits.at_noise and history.met:
                 end = stopped_at_noise(history)
-            elif objective.slope_0 == 0.0:
+            elif run is None and objective.slope_0 == 0.0:
                 end = "converged: dJ/dp is 0 at the start"
-            elif flat(objective, found, engine.limits):
+            elif run is None and flat(objective, found, engine.limits):
                 end = converged(objective, engine.limits)
             else:
                 end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
@@ -239,6 +246,7 @@ def invert(
         variables.warning(None if seen is None else seen.data),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
         None if interrupted else fit(problem, last, engine.solver),
+        None if interrupted else at_rest(problem, last, engine.solver),
     )
 
 

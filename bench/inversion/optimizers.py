@@ -14,7 +14,7 @@ from gradient_routes.bench.inversion.history import History
 from gradient_routes.bench.inversion.objective import Evaluation, Objective
 from gradient_routes.problems.problem import Array
 
-Name = Literal["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
+Name = Literal["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam", "linear"]
 DIVERGED = 1e3  # J, in J_0, above which a run diverges
 UNBOUNDED = 1e6  # -J, in J_0, above which J has no lower bound
 MEMORY = 20  # pairs of steps and gradient changes that L-BFGS keeps
@@ -148,7 +148,7 @@ def spent(limits: Limits) -> str:
 
 def optimizer(name: Name) -> Callable[..., str]:
     """(objective, history, limits) -> why it stopped. May raise Stopped."""
-    from gradient_routes.bench.inversion import least_squares
+    from gradient_routes.bench.inversion import least_squares, linear_map
 
     return {
         "lbfgs": lbfgs,
@@ -157,4 +157,5 @@ def optimizer(name: Name) -> Callable[..., str]:
         "gauss-newton": least_squares.gauss_newton,
         "levenberg-marquardt": least_squares.levenberg_marquardt,
         "trust": least_squares.trust,
+        "linear": linear_map.at_once,
     }[name]

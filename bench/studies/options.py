@@ -22,9 +22,9 @@ PROBLEM = "NAME, 'NAME[key=value]' or FILE.py:NAME: one problem."
 BUDGET = "Skip what is predicted to take more seconds; inf forces it."
 
 
-def problem_option(command: Command) -> Command:
+def problem_option(command: Command, required: bool = True) -> Command:
     """--problem, and how it reads its data."""
-    given = click.option("--problem", "selector", required=True, metavar="SELECTOR", help=PROBLEM)
+    given = click.option("--problem", "selector", required=required, metavar="SELECTOR", help=PROBLEM)
     return given(data_options(command))
 
 

@@ -109,6 +109,7 @@ class Solid(Problem):
         self.n_state = bc.n_u
         self.linear = o.law == "linear" and o.load != "follower"
         self.affine = self.linear and o.unknown in ("traction", "load")
+        self.affine_at_rest = o.load == "traction" and o.unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
         self.matrix_free = self.solid.symmetric or not use_numpy
         self.noise, self.seed = standard_deviation(o.noise, measured, self.name), o.seed

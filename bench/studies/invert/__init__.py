@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
 import click
 
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Rule, Study
-from gradient_routes.bench.command_options import at_option, routes_option, solver_options
+from gradient_routes.bench.command_options import at_option, replaces, routes_option, solver_options
 from gradient_routes.bench.inversion.columns import ESTIMATES, INVERSION, LCURVE, TRADEOFF
 from gradient_routes.bench.ranges import COUNT, FROM_ZERO, POSITIVE, SEED, Whole
 from gradient_routes.bench.studies.options import problem_option
@@ -21,6 +24,10 @@ DRAWS = "The same for N draws of the noise: bias and variance against alpha."
 MINIBATCH = "Gradients of K load cases at a time, drawn at random, for adam."
 RATE = "Of adam's steps, in natural changes of p."
 AT_NOISE = "End at the first step that meets the data to their noise: the discrepancy principle for iterations."
+LINEAR = "One linear solve in place of an iteration: the map from readings to p, about the start."
+MAP = "A map that -o has saved, in place of --problem."
+FRAMES = "Readings to apply it to: CSV with a column a reading and a row a frame, or .npz with one array."
+OUTPUT = f"FILE.npz: the map. FILE.csv: p of every frame. {replaces('.npz or .csv')}"
 RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")
 
@@ -34,6 +41,8 @@ STUDY = Study(
     routes invert --problem bar                                          five moduli of eight, to rounding
     routes invert --problem 'bar[noise=1e-3]' --alpha-sweep 1e-8 1 9     how much regularization
     routes invert --problem bar --route adjoint --route fd-central       the same answer, two costs
+    routes invert --problem bar --linear -o map.npz                      one linear solve, kept
+    routes invert --linear --map map.npz --frames readings.csv -o p.csv  for any number of frames
 
     Where the error that the solves leave in dJ/dp, estimated, exceeds what is left of it, the inversion stops and says
     so. Before "converged" is said, differences of J along two random directions confirm that dJ/dp is 0 there.
@@ -42,7 +51,7 @@ STUDY = Study(
     evaluated at the start, or --timeout is over, 2 wrong usage, 130 interrupted. What was found by then is shown and
     kept.""",
     options=(
-        problem_option,
+        partial(problem_option, required=False),
         routes_option("adjoint"),
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help=OPTIMIZER),
@@ -63,6 +72,10 @@ STUDY = Study(
         click.option("--minibatch", type=COUNT, metavar="K", help=MINIBATCH),
         click.option("--rate", type=POSITIVE, default=0.1, show_default=True, help=RATE),
         click.option("--seed", type=SEED, default=0, show_default=True, help="Of the minibatches."),
+        click.option("--linear", is_flag=True, help=LINEAR),
+        click.option("--map", "saved_map", type=click.Path(path_type=Path), metavar="FILE.npz", help=MAP),
+        click.option("--frames", type=click.Path(path_type=Path), metavar="FILE", help=FRAMES),
+        click.option("-o", "--output", type=click.Path(path_type=Path), multiple=True, metavar="FILE", help=OUTPUT),
         click.option("--resume", is_flag=True, help=RESUME),
         solver_options,
     ),
@@ -70,9 +83,15 @@ STUDY = Study(
         Rule(("rate",), lambda given: given["optimizer"] == "adam", "is of --optimizer adam"),
         Rule(("seed",), lambda given: given["minibatch"] is not None, "is of --minibatch"),
         Rule(
-            ("resume", "minibatch", "stop_at_noise"),
+            ("resume", "minibatch", "stop_at_noise", "linear"),
             lambda given: given["alpha_sweep"] is None,
             "is of a single inversion, not of an --alpha-sweep",
+        ),
+        Rule(("saved_map", "frames", "output"), lambda given: given["linear"], "is of --linear"),
+        Rule(
+            ("optimizer", "iterations", "positive", "minibatch", "resume", "stop_at_noise"),
+            lambda given: not given["linear"],
+            "is of an iteration, which --linear is not",
         ),
     ),
     tables={

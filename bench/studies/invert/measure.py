@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -17,16 +16,18 @@ from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.inversion.discrepancy import between
 from gradient_routes.bench.inversion.history import Iterate
 from gradient_routes.bench.inversion.invert import Engine, Inversion, check_noise, invert
-from gradient_routes.bench.inversion.lcurve import Point, l_curve, minima
+from gradient_routes.bench.inversion.lcurve import l_curve, minima
 from gradient_routes.bench.inversion.minibatch import minibatched
 from gradient_routes.bench.inversion.objective import noise_level
 from gradient_routes.bench.inversion.one_shot import OneShot, of_problem
 from gradient_routes.bench.inversion.optimizers import Limits, Name
 from gradient_routes.bench.inversion.resumed import last_estimate
-from gradient_routes.bench.inversion.tradeoff import Trade, trade_off
+from gradient_routes.bench.inversion.tradeoff import trade_off
 from gradient_routes.bench.inversion.variables import Positive, Variables
+from gradient_routes.bench.studies.invert.linear import by_map
+from gradient_routes.bench.studies.invert.messages import Begun, Compared, Ended, LCurve, Taken, Trades
 from gradient_routes.bench.studies.options import one_problem
-from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.errors import OUTSIDE, InputError
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.newton import Solver
 
@@ -34,53 +35,10 @@ One = TypeVar("One")
 Start = tuple[Array | None, int]  # p and the iterations before it
 
 
-@dataclass(frozen=True)
-class Begun:
-    """An inversion begins; `truth` tells whether the true p is known, `noise` whether steps are compared with it."""
-
-    title: str
-    truth: bool
-    noise: bool
-
-
-@dataclass(frozen=True)
-class Taken:
-    """A step of it."""
-
-    step: Iterate
-    noise: bool
-
-
-@dataclass(frozen=True)
-class Ended:
-    """An inversion has ended; `one_shot` is J of the linear least-squares answer, where there is one."""
-
-    inversion: Inversion
-    one_shot: float | None
-
-
-@dataclass(frozen=True)
-class Compared:
-    """All inversions, to be compared."""
-
-    inversions: list[Inversion]
-
-
-@dataclass(frozen=True)
-class LCurve:
-    points: list[Point]
-    best: Inversion
-
-
-@dataclass(frozen=True)
-class Trades:
-    trades: list[Trade]
-
-
 def run(
     say: Say,
     *,
-    selector: str,
+    selector: str | None,
     routes: Sequence[str],
     at: str,
     optimizer: Name,
@@ -94,10 +52,18 @@ def run(
     seed: int,
     stop_at_noise: bool,
     resume: bool,
+    linear: bool,
+    saved_map: Path | None,
+    frames: Path | None,
+    output: Sequence[Path],
     solver: Solver,
     kept: Path | None,
 ) -> int:
     """An interrupt or a failure ends the run, not what it has found by then."""
+    if linear:
+        return by_map(say, selector, routes, at, Limits(1, tolerance), saved_map, frames, output, solver, kept)
+    if selector is None:
+        raise InputError("--problem is missing - name one")
     _check(iterations, tolerance, rate, draws, alpha_sweep, minibatch, optimizer)
     if resume and kept is None:
         raise InputError("--resume: reads a store, with --no-store there is none - leave one of them out")
@@ -208,15 +174,22 @@ class Run:
                 raise KeyboardInterrupt
 
     def _one_shot(self, problem: Problem) -> float | None:
-        """J of the linear least-squares answer, where u is affine in p: what the loop has to reach."""
+        """J of the linear least-squares answer, where u is affine in p: what the loop has to reach, or to go below."""
         route = self.routes[0]
-        if not problem.affine or route.route.objection(problem, **route.options) is not None:
+        if (
+            not (problem.affine or problem.affine_at_rest)
+            or route.route.objection(problem, **route.options) is not None
+        ):
             return None
         prior = problem.regularization
         if prior is not None and prior.kind == "tv" and prior.alpha:
             self.say(Found("u is affine in p, but total variation is not quadratic: no one-shot answer"))
             return None
-        found: OneShot = of_problem(problem, route, self.engine, self.at)
+        try:
+            found: OneShot = of_problem(problem, route, self.engine, self.at)
+        except OUTSIDE as error:
+            self.say(Found(f"no one-shot answer: {error}"))
+            return None
         self.say(Found(found))
         return found.J
 

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from gradient_routes.bench.inversion.history import Iterate
 from gradient_routes.bench.inversion.invert import Inversion
+from gradient_routes.bench.inversion.linear_map import SUFFICES
 from gradient_routes.bench.inversion.one_shot import OneShot
 from gradient_routes.bench.inversion.optimizers import AT_NOISE
 from gradient_routes.bench.render.format import number, seconds
@@ -19,7 +20,16 @@ from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.studies.invert import lcurve_view, march_view
-from gradient_routes.bench.studies.invert.measure import Begun, Compared, Ended, LCurve, Taken, Trades
+from gradient_routes.bench.studies.invert.messages import (
+    Begun,
+    Compared,
+    Ended,
+    Framed,
+    LCurve,
+    Mapped,
+    Taken,
+    Trades,
+)
 from gradient_routes.problems.problem import Array
 
 WIDEST = 100  # columns of a plot
@@ -69,6 +79,11 @@ def show(out: Console, found: object, plots: bool = True) -> None:
             if plots:
                 out.print(lcurve_view.trade_plot(trades, width))
             out.print(lcurve_view.trades(trades))
+        case Mapped(inversion, by):
+            _estimates(out, inversion)
+            tables.say(out, by.described)
+        case Framed(estimates_of_frames):
+            tables.say(out, estimates_of_frames.described)
         case OneShot() | str():
             out.print(Text(str(found)), soft_wrap=not out.is_terminal)
 
@@ -109,14 +124,16 @@ def line(out: Console, step: Iterate, noise: bool = False) -> None:
 
 def ended(out: Console, found: Inversion, one_shot: float | None = None) -> None:
     """Why it stopped, and how it stands to the one-shot answer."""
-    well = found.end.startswith(("converged", AT_NOISE))
+    well = found.end.startswith(("converged", AT_NOISE, SUFFICES))
     out.print(Text(found.end, style="" if well else "yellow"), soft_wrap=not out.is_terminal)
-    if said := march_view.says(found):
+    for said in filter(None, (march_view.says(found), found.linear_regime)):
         out.print(Text(said), soft_wrap=not out.is_terminal)
     out.print(Text(found.scaled, style="dim"), soft_wrap=not out.is_terminal)
     if one_shot is not None:
         above = found.iterates[-1].objective / one_shot - 1.0 if one_shot > 0.0 else 0.0
-        stands = "meets the one-shot answer" if above <= SAME else "stays above the one-shot answer"
+        stands = (
+            "goes below" if above < -SAME else "meets" if above <= SAME else "stays above"
+        ) + " the one-shot answer"
         out.print(Text(f"the loop {stands}: J is {above:+.1e} of it away"), soft_wrap=not out.is_terminal)
 
 

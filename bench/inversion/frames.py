@@ -1,0 +1,111 @@
+"""Frames of readings, each of which a linear map takes to parameters."""
+
+from __future__ import annotations
+
+import csv
+import time
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gradient_routes.bench.cases.folder import located
+from gradient_routes.bench.inversion.linear_map import LinearMap
+from gradient_routes.bench.store.output_files import Output
+from gradient_routes.problems.data.csv import NumberFile
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array
+
+EXCESS = 2.0  # times the noise, above which it does not explain a frame
+MANY = 0.1  # of the frames, above which these are no accidents
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """p (F, n_p) of F frames; over_noise (F,): their |r| / (sigma sqrt(m)), None where no noise is known; seconds of
+    the products that gave p.
+    """
+
+    of: LinearMap
+    p: Array
+    over_noise: Array | None
+    seconds: float
+
+    @property
+    def described(self) -> str:
+        count = len(self.p)
+        said = f"{count} frames, {self.seconds / count * 1e6:.2g} us each"
+        if self.over_noise is None:
+            return said
+        said += f"; misfit / noise {np.median(self.over_noise):.3g} in the median"
+        beyond = np.flatnonzero(self.over_noise > EXCESS)
+        return said + (
+            f"; misfit exceeds noise in {len(beyond)}, first in frame {beyond[0] + 1}" if beyond.size else ""
+        )
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether noise does not explain many of them."""
+        return self.over_noise is not None and float(np.mean(self.over_noise > EXCESS)) > MANY
+
+    def write(self, output: Output) -> None:
+        """A row a frame: its number, its misfit over noise where that is known, p. Raises RoutesError."""
+        noise = [] if self.over_noise is None else ["misfit_over_noise"]
+        columns = self.p if self.over_noise is None else np.column_stack([self.over_noise, self.p])
+        with output.text() as file:
+            out = csv.writer(file, lineterminator="\n")
+            out.writerow(["frame", *noise, *self.of.names.tolist()])
+            out.writerows([k, *row] for k, row in enumerate(columns.tolist(), start=1))
+
+
+def estimated(by: LinearMap, frames: Array) -> Estimates:
+    """By one product for all frames (F, m)."""
+    begun = time.perf_counter()
+    p = by(frames)
+    seconds = time.perf_counter() - begun
+    if not by.sigma:
+        return Estimates(by, p, None, seconds)
+    r = by.residual(frames, p)
+    freedom = max(1, r.shape[1] - by.modes.shape[1])
+    return Estimates(by, p, np.sqrt(np.sum(r**2, axis=1) / freedom) / float(by.sigma), seconds)
+
+
+def read_frames(path: Path, by: LinearMap) -> Array:
+    """(F, m) of a file with a row a frame: .npz with one array, or CSV with a header. Columns that have the names of
+    readings are found by them, in any order; m columns with other names are taken in the order of the readings.
+
+    Raises InputError, naming the line or the frame.
+    """
+    frames = _from_npz(path) if path.suffix.lower() == ".npz" else _from_csv(path, by)
+    if frames.ndim != 2 or frames.shape[1] != len(by.readings) or not len(frames):
+        raise InputError(f"--frames {path}: an array {frames.shape} - give (frames, {len(by.readings)} readings)")
+    bad = np.flatnonzero(~np.isfinite(frames).all(axis=1))
+    if bad.size:
+        k = int(np.flatnonzero(~np.isfinite(frames[bad[0]]))[0])
+        raise InputError(f"--frames {path}: frame {bad[0] + 1}, reading {by.readings[k]} is not finite - remove it")
+    return frames
+
+
+def _from_csv(path: Path, by: LinearMap) -> Array:
+    file, readings = NumberFile.opened(path, located("")), by.readings.tolist()
+    named = set(readings) & set(file.names) if len(set(readings)) == len(readings) else set()
+    missing = [name for name in readings if name not in named]
+    if (named and missing) or (not named and len(file.names) != len(readings)):
+        lacks = f"without {missing[0]}" if named else f"for {len(readings)} readings, {readings[0]} to {readings[-1]}"
+        raise InputError(f"--frames {path}: {len(file.names)} columns {lacks} - give one a reading, a row a frame")
+    places = [file.names.index(name) for name in readings] if named else range(len(readings))
+    values, _ = file.read(list(places))
+    return np.ascontiguousarray(values.T)
+
+
+def _from_npz(path: Path) -> Array:
+    try:
+        with np.load(located(path), allow_pickle=False) as file:
+            if len(file.files) != 1:
+                raise InputError(f"--frames {path}: holds {len(file.files)} arrays - save one, (frames, readings)")
+            return np.asarray(file[file.files[0]], dtype=float)
+    except OSError as error:
+        raise InputError(f"--frames {path}: cannot be read: {error.strerror or error} - check the path") from error
+    except (ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"--frames {path}: holds no array of numbers - save (frames, readings) as .npz") from error
