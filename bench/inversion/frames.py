@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import time
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -107,5 +108,5 @@ def _from_npz(path: Path) -> Array:
             return np.asarray(file[file.files[0]], dtype=float)
     except OSError as error:
         raise InputError(f"--frames {path}: cannot be read: {error.strerror or error} - check the path") from error
-    except (ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"--frames {path}: holds no array of numbers - save (frames, readings) as .npz") from error

@@ -9,6 +9,7 @@ Phi is linearized, too: 1/2 |rho_0 + B (p - p_0)|^2. Inverse finite elements for
 from __future__ import annotations
 
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import BinaryIO
@@ -83,7 +84,7 @@ class LinearMap:
                 found = cls(**{name: file[name] for name in names})
         except OSError as error:
             raise InputError(f"--map {path}: cannot be read: {error.strerror or error} - check the path") from error
-        except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise no_map from error
         if not found._consistent:
             raise no_map

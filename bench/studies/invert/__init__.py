@@ -47,9 +47,9 @@ STUDY = Study(
     Where the error that the solves leave in dJ/dp, estimated, exceeds what is left of it, the inversion stops and says
     so. Before "converged" is said, differences of J along two random directions confirm that dJ/dp is 0 there.
 
-    Exit code: 0 ended (converged or not, the last line says which), 1 the gradient is not that of J, or J cannot be
-    evaluated at the start, or --timeout is over, 2 wrong usage, 130 interrupted. What was found by then is shown and
-    kept.""",
+    Exit code: 0 ended (converged or not, the last line says which), 1 the gradient is not that of J, or the model does
+    not explain the data, or J cannot be evaluated at the start, or --timeout is over, 2 wrong usage, 130 interrupted.
+    What was found by then is shown and kept.""",
     options=(
         partial(problem_option, required=False),
         routes_option("adjoint"),
