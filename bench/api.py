@@ -180,7 +180,8 @@ def invert(
 ) -> Inversion:
     """Minimize J(p) = 1/2 |S u(p) - d|^2 + alpha Phi(p), from `at`, with any route as the engine. `routes invert`.
 
-    optimizer   "lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent" or "adam"
+    optimizer   "lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent" or "adam"; "linear": one linear
+                solve, exact where u is linear in p
     iterations  at most
     tolerance   ends where |dJ/dp|, per natural change of p, is so much of its first, or of 1/2 |d|^2 (stiffness, rod)
     positive    "log" or "softplus": what keeps a raw parameter > 0

@@ -30,7 +30,7 @@ def between(
             return
         log_alpha = np.log([point.inversion.alpha for point in known])[first]
         alpha = float(f"{math.exp(PchipInterpolator(x, log_alpha)(0.0)):.6g}")
-        start = next(point.inversion for point in known if point.inversion.alpha > alpha)
+        start = min((point.inversion for point in known), key=lambda one: abs(math.log(one.alpha / alpha)))
         found = invert(spec, route, engine, at, start.p, made=start.made.weighted(alpha))
         yield found
         (point,) = l_curve([found])

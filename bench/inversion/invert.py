@@ -21,18 +21,19 @@ from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.fit import Fit, fit
 from gradient_routes.bench.inversion.history import History, Iterate, Watch
 from gradient_routes.bench.inversion.linear_regime import LinearRegime, at_rest
-from gradient_routes.bench.inversion.objective import Evaluation, Objective, noise_level, observed
+from gradient_routes.bench.inversion.objective import Evaluation, Objective, observed
 from gradient_routes.bench.inversion.optimizers import (
     Limits,
     Name,
     Stopped,
+    check_noise,
     converged,
     flat,
     optimizer,
     stopped_at_noise,
 )
 from gradient_routes.bench.inversion.variables import Positive, Variables
-from gradient_routes.problems.errors import OUTSIDE, InputError, RoutesError
+from gradient_routes.problems.errors import OUTSIDE, RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
 from gradient_routes.routes.measured_start import fitted_factor, small_strain_factor
 from gradient_routes.routes.model import Model
@@ -248,12 +249,6 @@ def invert(
         None if interrupted else fit(problem, last, engine.solver),
         None if interrupted else at_rest(problem, last, engine.solver),
     )
-
-
-def check_noise(problem: Problem, limits: Limits) -> None:
-    """Raises InputError where the inversion should stop at a noise that is not known."""
-    if limits.at_noise and not noise_level(problem, problem.parameters.start):
-        raise InputError(f"{problem.name}: --stop-at-noise, but the noise of its data is not known - give noise=")
 
 
 def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Problem, Array, str | None]:

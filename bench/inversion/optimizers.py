@@ -11,8 +11,9 @@ import numpy as np
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.inversion.diagnosis import explained
 from gradient_routes.bench.inversion.history import History
-from gradient_routes.bench.inversion.objective import Evaluation, Objective
-from gradient_routes.problems.problem import Array
+from gradient_routes.bench.inversion.objective import Evaluation, Objective, noise_level
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Problem
 
 Name = Literal["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam", "linear"]
 DIVERGED = 1e3  # J, in J_0, above which a run diverges
@@ -63,6 +64,12 @@ def flat(objective: Objective, found: Evaluation, limits: Limits) -> bool:
 
 def converged(objective: Objective, limits: Limits) -> str:
     return f"converged: |dJ/dp| is {limits.tolerance:g} of {objective.slope_scale_is}"
+
+
+def check_noise(problem: Problem, limits: Limits) -> None:
+    """Raises InputError where the inversion should stop at a noise that is not known."""
+    if limits.at_noise and not noise_level(problem, problem.parameters.start):
+        raise InputError(f"{problem.name}: --stop-at-noise, but the noise of its data is not known - give noise=")
 
 
 def stopped_at_noise(history: History) -> str:

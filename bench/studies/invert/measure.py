@@ -15,12 +15,12 @@ from gradient_routes.bench.cases.status import FOREIGN
 from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.inversion.discrepancy import between
 from gradient_routes.bench.inversion.history import Iterate
-from gradient_routes.bench.inversion.invert import Engine, Inversion, check_noise, invert
+from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.bench.inversion.lcurve import l_curve, minima
 from gradient_routes.bench.inversion.minibatch import minibatched
 from gradient_routes.bench.inversion.objective import noise_level
 from gradient_routes.bench.inversion.one_shot import OneShot, of_problem
-from gradient_routes.bench.inversion.optimizers import Limits, Name
+from gradient_routes.bench.inversion.optimizers import Limits, Name, check_noise
 from gradient_routes.bench.inversion.resumed import last_estimate
 from gradient_routes.bench.inversion.tradeoff import trade_off
 from gradient_routes.bench.inversion.variables import Positive, Variables

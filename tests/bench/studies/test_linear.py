@@ -207,3 +207,48 @@ def test_a_linear_answer_is_called_enough_by_its_readings() -> None:
     assert inverted("bar", "linear").end.startswith("the linear answer: its readings differ")
     assert far.regime is None, "R is linear in u"
     assert LinearRegime.of(np.array([3.0, -4.0]), 10.0).described("it").endswith("0.35 sigma, 0.4 at most")
+
+
+CUBIC = """
+import numpy as np
+from gradient_routes.problems.data.observation import Observation
+from gradient_routes.problems.problem import Linearization, Offers, Parameters, Problem
+
+class Cubic(Problem):
+    name, offers, n_state, structure, affine_at_rest = "cubic", Offers.LINEARIZE, 2, "spd", True
+    d = np.array([0.1, -0.2])
+
+    def __init__(self):
+        self.parameters = Parameters(start=np.full(2, 0.05), scale=np.ones(2))
+
+    def residual(self, u, p):
+        return u + u**3 - p
+
+    def tangent(self, u, p):
+        return np.diag(1.0 + 3.0 * u**2)
+
+    def objective(self, u, p):
+        return 0.5 * np.sum((u - self.d) ** 2)
+
+    def linearize(self, u, p):
+        return Linearization(-np.eye(2), u - self.d, np.zeros(2))
+
+    def observation(self, u, p):
+        return Observation(u, self.d, np.eye(2), sigma=1e-3)
+"""
+
+
+def test_the_small_strain_answer_to_a_load_comes_before_the_loop(cli) -> None:
+    """u + u^3 = p. At small strains p = d, where u solves u + u^3 = d. At the answer, p = d + d^3, u = p is linear."""
+    Path("cubic.py").write_text(CUBIC)
+    ran = cli("invert", "--problem", "cubic.py:Cubic", "--no-plot", "--no-store")
+    assert ran.code == 0, ran.err
+    d = [0.1, -0.2]
+    u = [np.roots([1.0, 0.0, 1.0, -each]) for each in d]
+    u = np.array([root.real for roots in u for root in roots if abs(root.imag) < 1e-12])
+    J = 0.5 * np.sum((u - d) ** 2)
+    assert f"u is affine in p at small strains: one linear least-squares solve gives J = {J:.6g}," in ran.out
+    assert "the loop goes below the one-shot answer" in ran.out
+    off = np.abs(d) ** 3 / 1e-3
+    says = f"{np.sqrt(np.mean(off**2)):.2g} sigma, {off.max():.2g} at most"
+    assert f"u = 0 does not suffice: its readings differ from those of the problem by {says}" in ran.out
