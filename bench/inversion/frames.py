@@ -105,7 +105,10 @@ def _from_npz(path: Path) -> Array:
         with np.load(located(path), allow_pickle=False) as file:
             if len(file.files) != 1:
                 raise InputError(f"--frames {path}: holds {len(file.files)} arrays - save one, (frames, readings)")
-            return np.asarray(file[file.files[0]], dtype=float)
+            found = file[file.files[0]]
+            if found.dtype.kind not in "iuf":
+                raise TypeError(found.dtype)
+            return np.asarray(found, dtype=float)
     except OSError as error:
         raise InputError(f"--frames {path}: cannot be read: {error.strerror or error} - check the path") from error
     except (ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error) as error:

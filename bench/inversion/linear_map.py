@@ -95,8 +95,17 @@ class LinearMap:
         if self.gain.ndim != 2 or self.modes.ndim != 2:
             return False
         (n_p, m), k = self.gain.shape, self.modes.shape[1]
-        shapes = {"offset": (n_p,), "H": (m, n_p), "rest": (m,), "weight": (m,), "modes": (m, k), "sigma": ()}
+        shapes = {
+            "offset": (n_p,),
+            "H": (m, n_p),
+            "rest": (m,),
+            "weight": (m,),
+            "modes": (m, k),
+            "sigma": (),
+            "rank": (),
+        }
         numbers = all(getattr(self, name).shape == of for name, of in shapes.items())
+        numbers = numbers and all(getattr(self, name).dtype == float for name in ("gain", "sd", *shapes))
         words = self.names.shape == self.units.shape == (n_p,) and self.readings.shape == (m,)
         return numbers and words and all(np.isfinite(getattr(self, name)).all() for name in ("gain", *shapes))
 
@@ -141,7 +150,7 @@ def linear_map(objective: Objective, selector: str) -> LinearMap:
         modes=np.zeros((m, 0)) if seen.modes is None else seen.modes,
         sigma=np.array(seen.sigma),
         sd=posterior.known(problem, at.p, A[:m], T, seen.sigma).sd,
-        rank=np.array(int(known.sum())),
+        rank=np.array(float(known.sum())),
         names=np.array([q.label(i) for i in range(n_p)]),
         units=np.array([q.unit_of(i) for i in range(n_p)]),
         readings=np.array([seen.label(k) for k in range(m)]),

@@ -18,6 +18,7 @@ from gradient_routes.bench.inversion.objective import Objective
 from gradient_routes.bench.inversion.optimizers import Limits
 from gradient_routes.bench.inversion.variables import Variables
 from gradient_routes.problems.bar import Bar
+from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
@@ -154,8 +155,9 @@ def test_a_map_is_made_once_and_applied_to_files(cli) -> None:
         (np.ones((2, 4)), "an array (2, 4) - give (frames, 5 readings)"),
         (np.where(np.eye(3, 5) > 0, np.nan, 1.0)[1:], "frame 1, reading u_2 is not finite"),
         (np.array([[None]]), "holds no array of numbers"),
+        (np.ones((2, 5)) * 1j, "holds no array of numbers"),
     ],
-    ids="few many nan none few-npz nan-npz objects".split(),
+    ids="few many nan none few-npz nan-npz objects complex".split(),
 )
 def test_frames_that_are_none_are_one_line(cli, frames, says: str) -> None:
     with open("map.npz", "wb") as file:
@@ -207,6 +209,25 @@ def test_a_linear_answer_is_called_enough_by_its_readings() -> None:
     assert inverted("bar", "linear").end.startswith("the linear answer: its readings differ")
     assert far.regime is None, "R is linear in u"
     assert LinearRegime.of(np.array([3.0, -4.0]), 10.0).described("it").endswith("0.35 sigma, 0.4 at most")
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        {"gain": np.full((8, 5), np.nan)},
+        {"gain": np.ones((8, 4))},
+        {"gain": np.full((8, 5), "x")},
+        {"names": np.array([None] * 8)},
+        {"H": np.ones((5, 8)) * 1j},
+    ],
+    ids="nan shape words pickled complex".split(),
+)
+def test_what_is_no_map_is_refused(tmp_path: Path, spoil: dict[str, Array]) -> None:
+    by = mapped(Bar())
+    with (tmp_path / "map.npz").open("wb") as file:
+        replace(by, **spoil).save(file)
+    with pytest.raises(InputError, match="is no map - write one by"):
+        LinearMap.load(tmp_path / "map.npz")
 
 
 CUBIC = """
