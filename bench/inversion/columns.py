@@ -8,7 +8,7 @@ RUN = (
     *PROBLEM,
     Column("route", "TEXT", "", "name of the route that gives gradients"),
     Column("route_options", "TEXT", "", "its options", json=True),
-    Column("optimizer", "TEXT", "", "lbfgs, gauss-newton, levenberg-marquardt, trust, descent, adam or one-shot"),
+    Column("optimizer", "TEXT", "", "lbfgs, gauss-newton, levenberg-marquardt, trust, descent, adam or linear"),
     Column("alpha", "REAL", "1", "weight of Phi in J"),
     Column("label", "TEXT", "", "selector of problem and route, as a person reads them"),
 )

@@ -3,7 +3,8 @@
     p(d) = argmin 1/2 |y_0 + H (p - p_0) - d|^2 + alpha Phi(p),     H = S_u R_u^{-1} (-R_p) + S_p at p_0, y_0 = S u(p_0)
 
 Where u is affine in p (tractions, loads, a source) this is the minimum of J; elsewhere one Gauss-Newton step from p_0.
-Phi is linearized, too: 1/2 |rho_0 + B (p - p_0)|^2. Inverse finite elements for loads (Tessler & Spangler 2005).
+Phi is linearized, too: 1/2 |rho_0 + B (p - p_0)|^2. Inverse finite element methods (Tessler & Spangler 2005) find u
+from strains in this manner, by one least-squares operator that is made beforehand.
 """
 
 from __future__ import annotations

@@ -79,6 +79,13 @@ def history(rows: Sequence[Row]) -> Figure | None:
 
 
 def says(rows: Sequence[Row]) -> str:
+    met = [
+        f"{row['run']} meets the data to their noise at iteration {row['iteration']}." for row in rows if row["chosen"]
+    ]
+    return " ".join([paid(rows), *met[:2]])
+
+
+def paid(rows: Sequence[Row]) -> str:
     costs = [row for row in arrivals(rows) if row["solves"] is not None]
     if not costs:
         return "A flat line has stalled."

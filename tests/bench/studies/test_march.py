@@ -75,7 +75,9 @@ def test_rows_and_reports_mark_the_step(cli) -> None:
     ran = cli("report", "-o", "report.html")
     assert ran.code == 0
     with open("report.html") as page:
-        assert "misfit against noise" in page.read()
+        text = page.read()
+    assert "misfit against noise" in text
+    assert "adjoint, lbfgs meets the data to their noise at iteration 9." in text
 
 
 @pytest.mark.parametrize(
