@@ -90,14 +90,15 @@ class Block(Solid):
 
     def case(self) -> dict[str, Any]:
         """With one dead load on moduli, read at nodes."""
-        solid, probes, options = self.solid, self.data.probes, self._options
+        solid, probes, options = self.solid, self.data.probes[0], self._options
         undescribed = {
             "load": solid.load != "traction",
             "fixed": options["fixed"] is not None,
-            "cases": len(solid.directions) > 1,
+            "cases": options["cases"] > 1,
             "unknown": solid.design.parameter_of_cell is None,
             "markers" if options["markers"] else "data": probes.nodes.shape[1] > 1 or not probes.measured.all(),
-            "motion": self.data.motion is not None,
+            "data": len(solid.directions) > options["cases"],
+            "motion": self.data.motions is not None,
             "alpha": self.alpha > 0.0,
         }
         for name in (name for name, holds in undescribed.items() if holds):

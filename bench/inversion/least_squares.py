@@ -102,6 +102,8 @@ class Residuals:
 
 def gauss_newton(objective: Objective, history: History, limits: Limits) -> str:
     """Gauss-Newton in a trust region, each step by products with H (LSMR): SciPy's least_squares, trf."""
+    if len(objective.accepted.x) == 1:  # its search in a plane of two directions ends in IndexError
+        return _by_least_squares(objective, history, limits, Residuals.dense, {"method": "trf", "tr_solver": "exact"})
     lsmr = {"method": "trf", "tr_solver": "lsmr", "tr_options": LSMR}
     return _by_least_squares(objective, history, limits, Residuals.derivative, lsmr)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.data.motion import Motion
+from gradient_routes.problems.data.motion import Motion, MotionName, check
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.probes import Probes
 from gradient_routes.problems.errors import InputError
@@ -21,18 +21,32 @@ from gradient_routes.problems.problem import Array
 class DisplacementData:
     """S and d of J = 1/2 sum over load cases of |S u - d|^2 [m^2].
 
-    d (cases, m, d)  [m], None for synthetic data that are not computed yet
-    noise            standard deviation of the noise on d [m]
-    motion           what is eliminated from J, in every load case for itself
+    All of these for every load case:
+    probes    where displacements are read
+    d (m, d)  [m], None for synthetic data that are not computed yet
+    motions   what is eliminated from J
+    noise     standard deviation of the noise on d [m]
     """
 
     solid: LoadedSolid
-    probes: Probes
-    d: Array | None
+    probes: tuple[Probes, ...]
+    d: tuple[Array, ...] | None
     noise: float = 0.0
-    motion: Motion | None = None
+    motions: tuple[Motion, ...] | None = None
 
-    def require_data(self) -> Array:
+    def with_motion(self, kind: MotionName) -> DisplacementData:
+        """With a motion to eliminate in each case. Raises InputError for data that are all motion."""
+        turns, who = self.solid.mesh.geometry.axisymmetric, self.solid.mesh.who
+        if kind == "none":
+            return self
+        motions = tuple(Motion.of(kind, at.x, at.measured, at.weights, turns) for at in self.probes)
+        if self.d is not None:
+            check(
+                motions, [at.residual(0.0 * at.N[..., None], d) for at, d in zip(self.probes, self.d, strict=True)], who
+            )
+        return replace(self, motions=motions)
+
+    def require_data(self) -> tuple[Array, ...]:
         """d. Raises InputError for synthetic data that are not computed yet."""
         if self.d is None:
             raise InputError(
@@ -43,59 +57,65 @@ class DisplacementData:
 
     def zeros(self) -> DisplacementData:
         """With d = 0, to solve for the state that synthetic data are read from."""
-        return replace(self, d=np.zeros((self._cases, *self.probes.x.shape)))
+        return replace(self, d=tuple(np.zeros(at.x.shape) for at in self.probes))
 
     def synthesized(self, u: Array, s: Setup, rng: np.random.Generator) -> DisplacementData:
         """With the data that the probes read from u, plus noise."""
-        d = np.stack([self.probes.read(U) for U in self._probe_displacements(u, s)])
-        return replace(self, d=d + self.noise * rng.standard_normal(d.shape))
+        read = (self.probes[case].read(U) for case, U in enumerate(self._probe_displacements(u, s)))
+        return replace(self, d=tuple(d + self.noise * rng.standard_normal(d.shape) for d in read))
 
     def single_case(self, case: int) -> DisplacementData:
         """The data of one load case."""
-        return replace(self, solid=self.solid.single_case(case), d=self.require_data()[case : case + 1])
+        of = slice(case, case + 1)
+        motions = None if self.motions is None else self.motions[of]
+        solid, d = self.solid.single_case(case), self.require_data()[of]
+        return replace(self, solid=solid, probes=self.probes[of], d=d, motions=motions)
 
     def reads_nothing(self) -> bool:
         """Whether all probes are at clamped nodes."""
         bc = self.solid.bc
-        return not (bc.index[:, self.probes.nodes] != bc.n_free).any()
+        return not any((bc.index[case][at.nodes] != bc.n_free).any() for case, at in enumerate(self.probes))
 
     def misfit(self, u: Any, p: Any, xp: Any = np) -> Any:
-        d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p, xp), xp)
-        return sum(0.5 * (self._residual(U[case], d[case]) ** 2).sum() for case in range(len(d)))
+        return sum(0.5 * (r**2).sum() for r in self._residuals(u, p, xp))
 
-    def _residual(self, U: Any, d: Any) -> Any:
-        """P w (S u - d), (m,), of one load case."""
-        r = self.probes.residual(U, d)
-        return r if self.motion is None else self.motion.projected(r)
+    def _residuals(self, u: Any, p: Any, xp: Any = np) -> list[Any]:
+        """P w (S u - d), (m,), of every load case."""
+        d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p, xp), xp)
+        plain = [at.residual(U[case], d[case]) for case, at in enumerate(self.probes)]
+        if self.motions is None:
+            return plain
+        return [motion.projected(r) for motion, r in zip(self.motions, plain, strict=True)]
 
     def moved(self, u: Array, p: Array) -> dict[str, float]:
         """The motion that is eliminated, by name."""
-        if self.motion is None:
+        if self.motions is None:
             return {}
         d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
-        found = [self.motion.of_residual(self.probes.residual(U[case], d[case])) for case in range(len(d))]
+        found = [m.of_residual(self.probes[k].residual(U[k], d[k])) for k, m in enumerate(self.motions)]
         several = len(found) > 1
         return {f"{name}, case {k + 1}" if several else name: m for k, of in enumerate(found) for name, m in of.items()}
 
     def misfit_gradient(self, u: Array, p: Array) -> tuple[Array, Any]:
         """Derivatives of the misfit with respect to u (n_u,) and the grip displacement."""
-        d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
-        forces = [self.probes.forces(self._residual(U[case], d[case])) for case in range(len(d))]
-        parts = [self.solid.bc.assemble(f, self.probes.nodes, case) for case, f in enumerate(forces)]
+        parts = [
+            self.solid.bc.assemble(at.forces(r), at.nodes, case)
+            for case, (at, r) in enumerate(zip(self.probes, self._residuals(u, p), strict=True))
+        ]
         return np.concatenate([by_u for by_u, _ in parts]), sum(by_a for _, by_a in parts)
 
     def observation(self, u: Array, p: Array) -> Observation:
         d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
-        measured, cases = self.probes.measured, range(len(d))
         S_u, S_a = self._sampling_matrix
-        predicted = np.concatenate([self.probes.read(U[case])[measured] for case in cases])
-        data = np.concatenate([d[case][measured] for case in cases])
+        predicted = np.concatenate([at.read(U[case])[at.measured] for case, at in enumerate(self.probes)])
+        data = np.concatenate([d[case][at.measured] for case, at in enumerate(self.probes)])
         S_p = S_a if self.solid.grip_is_parameter else None
-        at = np.tile(self.probes.x[np.nonzero(measured)[0]], (len(d), 1))
-        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=at)
-        if self.probes.weights is not None:
-            seen = seen.weighted(np.tile(self.probes.weights[measured], len(d)))
-        return seen if self.motion is None else seen.without(self.motion, len(d))
+        position = np.concatenate([at.x[np.nonzero(at.measured)[0]] for at in self.probes])
+        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=position)
+        if self.probes[0].weights is not None:
+            weights = [at.weights[at.measured] for at in self.probes if at.weights is not None]
+            seen = seen.weighted(np.concatenate(weights))
+        return seen if self.motions is None else seen.without(self.motions)
 
     def candidates(self) -> Candidates:
         """Every free displacement component of every node, in every load case."""
@@ -110,30 +130,36 @@ class DisplacementData:
 
     def _probe_displacements(self, u: Any, s: Setup, xp: Any = np) -> list[Any]:
         """Displacements of the probes' nodes, (m, k, d) per load case."""
-        return [self.solid.displacements(u, s, case, self.probes.nodes, xp) for case in range(self._cases)]
+        return [self.solid.displacements(u, s, case, at.nodes, xp) for case, at in enumerate(self.probes)]
 
     @cached_property
     def _sampling_matrix(self) -> tuple[Any, Array]:
         """The rows of S for u (m, n_u), sparse, and for the grip displacement (m, 1)."""
         from scipy import sparse
 
-        bc, probes = self.solid.bc, self.probes
-        points, components = np.nonzero(probes.measured)
-        N, blocks, grips = probes.N[points], [], []
-        for case in range(self._cases):
+        bc, blocks, grips = self.solid.bc, [], []
+        for case, probes in enumerate(self.probes):
+            points, components = np.nonzero(probes.measured)
             at = bc.index[case][probes.nodes[points], components[:, None]]  # (m, k)
             rows = np.broadcast_to(np.arange(len(points))[:, None], at.shape)
-            entries = (N.ravel(), (rows.ravel(), at.ravel()))
-            S = sparse.csr_array(entries, shape=(len(points), bc.n_free + 2))
+            entries = (probes.N[points].ravel(), (rows.ravel(), at.ravel()))
+            S = sparse.csr_array(entries, shape=(len(points), bc.size))
             blocks.append(S[:, : bc.n_free])
-            grips.append(S[:, [bc.n_free + 1]].toarray())
+            grips.append(S[:, bc.n_free + 1 :] @ bc.directions[case][:, None])
         return sparse.block_diag(blocks, format="csr"), np.concatenate(grips)
 
+    @cached_property
+    def _starts(self) -> Array:
+        """The number of the first datum of each load case."""
+        return np.cumsum([0, *(np.count_nonzero(at.measured) for at in self.probes)])
+
     def _label(self, k: int) -> str:
-        points, components = np.nonzero(self.probes.measured)
-        case, k = divmod(k, len(points))
-        return self._name(int(components[k]), self.probes.x[points[k]], case)
+        case = int(np.searchsorted(self._starts, k, side="right")) - 1
+        probes = self.probes[case]
+        points, components = np.nonzero(probes.measured)
+        i = k - self._starts[case]
+        return self._name(int(components[i]), probes.x[points[i]], case)
 
     def _name(self, component: int, x: Array, case: int) -> str:
-        which = f", case {case + 1}" if self._cases > 1 else ""
+        which = f", case {case + 1}" if len(self.probes) > 1 else ""
         return f"u_{'xyz'[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){which}"

@@ -52,9 +52,10 @@ def match(file: NumberFile, names: Sequence[str], given: Mapping[str, str]) -> t
     others = [file.names[k] for k in sorted(rest) if file.names[k]]
     telling = [header for header in others if plain(split_header(header)[0]) in CASES]
     if telling:
+        cases = f", or name it the case beside a column load: columns=case:{telling[0]}" if "case" in names else ""
         raise InputError(
-            f"{file.path}: column {telling[0]}: load cases are not read from files yet, and as one their rows would be"
-            f" fitted wrongly - keep the rows of one {telling[0]} and remove the column"
+            f"{file.path}: column {telling[0]} tells cases apart, and as one their rows would be fitted wrongly - keep"
+            f" the rows of one {telling[0]} and remove the column{cases}"
         )
     return found, others
 

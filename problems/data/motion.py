@@ -32,22 +32,14 @@ class Motion:
     Q: Array
 
     @classmethod
-    def of(cls, kind: MotionName, x: Array, measured: Array, weights: Array | None, turns: bool) -> Motion | None:
+    def of(cls, kind: MotionName, x: Array, measured: Array, weights: Array | None, turns: bool) -> Motion:
         """Of points x (m, d); measured, weights (m, d) as of Probes; turns: of a body of revolution, which moves along
         its axis alone. Rotations, small ones, are about the points' centre.
         """
-        if kind == "none":
-            return None
         names, modes = _modes(x, turns) if kind == "rigid" or turns else _translations(x)
         B = np.stack([(mode if weights is None else weights * mode)[measured] for mode in modes], axis=1)
         U, s, _ = np.linalg.svd(B / (np.linalg.norm(B, axis=0) + np.finfo(float).tiny), full_matrices=False)
         return cls(B, tuple(names), U[:, s > RANK * s.max()])
-
-    def check(self, d: Array, who: str) -> None:
-        """Raises InputError for data (cases, m) that are all motion."""
-        left = np.linalg.norm(self.projected(d))
-        if self.Q.shape[0] <= self.Q.shape[1] or left <= RIGID * np.linalg.norm(d):
-            raise InputError(f"{who}: motion= leaves nothing of the data: all of them move as one - leave it out")
 
     def projected(self, r: Any) -> Any:
         """P r, of r (..., m)."""
@@ -71,6 +63,14 @@ class Motion:
 
         m = len(self.Q)
         return LinearOperator((m, m), matvec=P, rmatvec=P, matmat=P, rmatmat=P, dtype=float) @ aslinearoperator(S_u)
+
+
+def check(motions: Sequence[Motion], d: Sequence[Array], who: str) -> None:
+    """Raises InputError for data d (m,) of each load case that are all motion."""
+    left = [np.linalg.norm(motion.projected(of)) for motion, of in zip(motions, d, strict=True)]
+    sees = any(len(motion.Q) > motion.Q.shape[1] for motion in motions)
+    if not sees or np.linalg.norm(left) <= RIGID * np.linalg.norm(np.concatenate(d)):
+        raise InputError(f"{who}: motion= leaves nothing of the data: all of them move as one - leave it out")
 
 
 def _translations(x: Array) -> tuple[Sequence[str], list[Array]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -54,21 +54,23 @@ class Observation:
             relative=w * self.relative,
         )
 
-    def without(self, motion: Motion, cases: int) -> Observation:
+    def without(self, motions: Sequence[Motion]) -> Observation:
         """With the motion of each load case eliminated; S_u is a LinearOperator then."""
+        from scipy.linalg import block_diag
         from scipy.sparse.linalg import LinearOperator
 
-        S, m = self.S_u.tocsr(), len(motion.Q)
-        parts = [motion.sampled(S[k * m : (k + 1) * m]) for k in range(cases)]
+        S, ends = self.S_u.tocsr(), np.cumsum([len(motion.Q) for motion in motions])
+        rows = [slice(end - len(motion.Q), end) for end, motion in zip(ends, motions, strict=True)]
+        parts = [motion.sampled(S[of]) for motion, of in zip(motions, rows, strict=True)]
 
         def stacked(v: Array) -> Array:
             return np.concatenate([part @ v for part in parts])
 
         def spread(w: Array) -> Array:
-            return np.asarray(sum(part.T @ w[k * m : (k + 1) * m] for k, part in enumerate(parts)))
+            return np.asarray(sum(part.T @ w[of] for part, of in zip(parts, rows, strict=True)))
 
         def projected(v: Array) -> Array:
-            return np.asarray(motion.projected(v.reshape(cases, m))).ravel()
+            return np.concatenate([motion.projected(v[of]) for motion, of in zip(motions, rows, strict=True)])
 
         return replace(
             self,
@@ -77,7 +79,7 @@ class Observation:
             S_u=LinearOperator(S.shape, matvec=stacked, rmatvec=spread, matmat=stacked, rmatmat=spread, dtype=float),
             S_p=None if self.S_p is None else np.stack([projected(column) for column in self.S_p.T], axis=1),
             whole=self,
-            modes=np.kron(np.eye(cases), motion.Q),
+            modes=block_diag(*(motion.Q for motion in motions)),
         )
 
 

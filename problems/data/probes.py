@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.data.load_cases import CASE, LOAD, LoadCases
 from gradient_routes.problems.data.placing import Outside, place
 from gradient_routes.problems.data.repeats import without_repeats
 from gradient_routes.problems.data.table import Group, Table, read_table
@@ -32,6 +33,11 @@ class Probes:
     x: Array
     measured: Array
     weights: Array | None = None
+
+    def at(self, rows: Array) -> Probes:
+        """Some of the points."""
+        weights = None if self.weights is None else self.weights[rows]
+        return Probes(self.nodes[rows], self.N[rows], self.x[rows], self.measured[rows], weights)
 
     def read(self, U: Any) -> Any:
         """(m, d) [m], from the nodes' displacements U (m, k, d)."""
@@ -80,11 +86,14 @@ def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Pro
 
 @dataclass(frozen=True)
 class Measured:
-    """What a file holds: probes, data d (m, d) [m], noise sigma [m], 0 if unknown, and notes on how it was read."""
+    """What a file holds: for each load case probes and data d (m, d) [m]; noise sigma [m], 0 if unknown; the loads of
+    its cases, where it names any; and notes on how it was read.
+    """
 
-    probes: Probes
-    d: Array
+    probes: tuple[Probes, ...]
+    d: tuple[Array, ...]
     sigma: float
+    loads: LoadCases | None
     notes: tuple[str, ...]
 
 
@@ -98,37 +107,51 @@ def read_probes(
 ) -> Measured:
     """Read x,y,z and any of ux,uy,uz, of a plane body x,y and ux,uy; an empty cell was not measured.
 
-    See `read_table` and `place`. The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y, sigma_z, by
-    which data are then weighted.
+    See `read_table`, `LoadCases` and `place`. The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y,
+    sigma_z, by which data are then weighted.
     Raises InputError for a file that cannot be understood, and for points outside the body.
     """
     axes = AXES[: mesh.geometry.dim]
     table = read_table(path, groups(axes), columns, units)
     x, d = table.stack(axes), table.stack([f"u{axis}" for axis in axes])
-    sigma = noise_of(table, axes, d, noise)
-    kept, repeated = without_repeats(path, x, d, table.lines, sigma)
+    sigma, loads = noise_of(table, axes, d, noise), LoadCases.of(table)
+    case = np.zeros(len(x), dtype=int) if loads is None else loads.rows
+    kept, repeated = np.zeros(len(x), dtype=bool), set()
+    for k in range(case.max() + 1):
+        of = case == k
+        among = sigma[of] if isinstance(sigma, np.ndarray) else sigma
+        kept[of], said = without_repeats(path, x[of], d[of], table.lines[of], among)
+        repeated.add(said)
     placed = place(mesh, x[kept], path, outside)
     rows = np.flatnonzero(kept)[placed.rows]
-    d, weights = d[rows], None
+    d, case = d[rows], case[rows]
     measured = ~np.isnan(d)
-    if not measured.any():
-        raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
+    blind = np.setdiff1d(np.arange(1 if loads is None else len(loads.values)), case[measured.any(axis=1)])
+    if blind.size:
+        where = "" if loads is None else f" under load {loads.values[blind[0]]:g}, case {blind[0] + 1}"
+        raise InputError(f"{path}: measures nothing{where} - give at least one row with a displacement")
+    weights = None
     if isinstance(sigma, np.ndarray):
         level = float(np.mean(sigma[rows][measured] ** -2.0) ** -0.5)
         weights = level / np.where(measured, sigma[rows], level)
         sigma = level
-    probes = Probes(placed.nodes, placed.N, placed.x, measured, weights)
+    everything = Probes(placed.nodes, placed.N, placed.x, measured, weights)
     doubtful = doubt(sigma, float(np.abs(d[measured]).max(initial=0.0)))
-    notes = tuple(filter(None, (table.said, repeated, *placed.said, doubtful)))
-    return Measured(probes, np.where(measured, d, 0.0), sigma, notes)
+    cases = "" if loads is None else loads.said(rows)
+    notes = tuple(filter(None, (table.said, cases, *sorted(repeated), *placed.said, doubtful)))
+    d = np.where(measured, d, 0.0)
+    of_case = [np.flatnonzero(case == k) for k in range(case.max() + 1)]
+    return Measured(tuple(everything.at(of) for of in of_case), tuple(d[of] for of in of_case), sigma, loads, notes)
 
 
-def groups(axes: str) -> tuple[Group, Group, Group]:
-    """The columns of coordinates, displacements and their noise."""
+def groups(axes: str) -> tuple[Group, ...]:
+    """The columns of coordinates, displacements, their noise, and load cases."""
     return (
         Group(tuple(axes), "length", marked=False),
         Group(tuple(f"u{axis}" for axis in axes), "length", need="any", gaps=True),
         Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True),
+        LOAD,
+        CASE,
     )
 
 

@@ -27,6 +27,7 @@ class Group:
     need   whether all of them must be there, any, or none
     gaps   whether a cell may be empty; it is read as NaN
     marked whether numbers such as -999 among them are taken for marks of missing values
+    others quantities that they are instead where their unit says so
     """
 
     names: tuple[str, ...]
@@ -34,6 +35,7 @@ class Group:
     need: str = "all"
     gaps: bool = False
     marked: bool = True
+    others: tuple[Kind, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,7 @@ def read_table(
     for group in groups:
         _check_need(file, group, {*found, *constants})
     said_of_units = Units.parse(units, [*kinds], f"{path}: units={units}")
+    kinds |= _by_unit(path, groups, found, said_of_units)
     for kind, unit in said_of_units.of_kind.items():
         if not any(kinds[name] == kind and column.unit is None for name, column in found.items()):
             raise InputError(
@@ -141,6 +144,17 @@ def read_table(
     how = {name: f"in {unit}, factor {factors[name]:g}" for name, unit in stated.items()}
     how |= {name: f"in {unit}, plus {add:g}" for name, unit in stated.items() if (add := zero(unit, kinds[name]))}
     return Table(path, read | every_row | words, lines, _said(found.values(), how, values, others), stated)
+
+
+def _by_unit(path: str | Path, groups: Sequence[Group], found: Mapping[str, Column], units: Units) -> dict[str, Kind]:
+    """The kinds of columns whose unit tells them."""
+    stated = {
+        name: (kind_of(unit, f"{path}: column {found[name].header}"), group.others)
+        for group in groups
+        for name in group.names
+        if group.others and name in found and (unit := units.of_column.get(name, found[name].unit))
+    }
+    return {name: kind for name, (kind, others) in stated.items() if kind in others}
 
 
 def _assigned(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,18 @@ from gradient_routes.problems.problem import Array
 class BoundaryConditions:
     """Degrees of freedom in one or more load cases; u concatenates those of all cases.
 
-    n_free                         degrees of freedom of one case
-    index (cases, n_nodes, d)      position of a nodal displacement in (u_case, 0, a), a the grip displacement [m]
-    held (n_nodes, d)              components that are zero
-    gripped                        node numbers
+    n_free                     degrees of freedom of one case
+    index (cases, n_nodes, d)  position of a nodal displacement in (u_case, 0, displacement (d,) of the grip)
+    held (n_nodes, d)          components that are zero
+    gripped                    node numbers
+    directions (cases, d)      displacement of the grip per unit amplitude
     """
 
     n_free: int
     index: Array
     held: Array
     gripped: Array
+    directions: Array
 
     @classmethod
     def of(cls, mesh: Mesh, held: Array, gripped: Array, directions: Array) -> BoundaryConditions:
@@ -42,13 +44,17 @@ class BoundaryConditions:
             raise InputError(f"{mesh.who}: no node is free to move - refine the mesh or clamp less")
         index = np.full(held.shape, n_free)
         index[free] = np.arange(n_free)
-        cases = np.repeat(index[None], len(directions), axis=0)
-        for case, direction in zip(cases, directions, strict=True):
-            case[gripped[:, None], np.flatnonzero(direction)] = n_free + 1
-            case[held] = n_free
-            if gripped.size and not (case > n_free).any():
+        index[gripped] = n_free + 1 + np.arange(held.shape[1])
+        index[held] = n_free
+        for direction in directions:
+            if gripped.size and direction.any() and not (index > n_free)[:, direction != 0.0].any():
                 raise InputError(f"{mesh.who}: the grip moves nothing: what it would move is held - free it")
-        return cls(n_free, cases, held, gripped)
+        return cls(n_free, np.repeat(index[None], len(directions), axis=0), held, gripped, directions)
+
+    def single_case(self, case: int) -> BoundaryConditions:
+        """Those of one load case."""
+        of = slice(case, case + 1)
+        return replace(self, index=self.index[of], directions=self.directions[of])
 
     @property
     def clamped(self) -> Array:
@@ -59,10 +65,15 @@ class BoundaryConditions:
     def n_u(self) -> int:
         return self.n_free * len(self.index)
 
+    @property
+    def size(self) -> int:
+        """How many numbers `index` points to."""
+        return self.n_free + 1 + int(self.held.shape[1])
+
     def displacements(self, u: Any, a: Any, case: int, nodes: Array, xp: Any) -> Any:
-        """Displacements (..., d) of nodes in a load case, from u (n_u,) and the grip displacement a."""
+        """Displacements (..., d) of nodes in a load case, from u (n_u,) and the amplitude a of the grip."""
         u_case = u[case * self.n_free : (case + 1) * self.n_free]
-        return xp.concatenate([u_case, xp.stack([0.0 * a, a])])[self.index[case][nodes]]
+        return xp.concatenate([u_case, xp.reshape(0.0 * a, 1), a * self.directions[case]])[self.index[case][nodes]]
 
     def dofs(self, nodes: Array, case: int = 0) -> Array:
         """(n_e, d n_a), degrees of freedom of the cells within a case, -1 where constrained; the same in all cases."""
@@ -78,12 +89,11 @@ class BoundaryConditions:
 
     def assemble(self, forces: Array, nodes: Array, case: int) -> tuple[Array, Any]:
         """The transpose of `displacements`: nodal forces (..., d) summed into (n_free,), and their part on a."""
-        at, n = self.index[case][nodes].ravel(), self.n_free + 2
-        flat = forces.ravel()
-        total = np.bincount(at, weights=flat.real, minlength=n)
+        at, flat = self.index[case][nodes].ravel(), forces.ravel()
+        total = np.bincount(at, weights=flat.real, minlength=self.size)
         if np.iscomplexobj(flat):
-            total = total + 1j * np.bincount(at, weights=flat.imag, minlength=n)
-        return total[: self.n_free], total[-1]
+            total = total + 1j * np.bincount(at, weights=flat.imag, minlength=self.size)
+        return total[: self.n_free], total[self.n_free + 1 :] @ self.directions[case]
 
 
 def rigid_body_modes(geometry: Geometry) -> Array:

@@ -62,9 +62,7 @@ class LoadedSolid:
 
     def single_case(self, case: int) -> LoadedSolid:
         """The same solid in load case `case` only."""
-        of = slice(case, case + 1)
-        bc = replace(self.bc, index=self.bc.index[of])
-        return replace(self, bc=bc, directions=self.directions[of])
+        return replace(self, bc=self.bc.single_case(case), directions=self.directions[case : case + 1])
 
     def setup(self, p: Any, xp: Any = np) -> Setup:
         """Material constants, nodal positions and load at p."""
@@ -134,7 +132,7 @@ class LoadedSolid:
         parts = []
         for case, index in enumerate(self.bc.index):
             f = self.follower_forces(self.displacements(u, s, case, facets.nodes, jnp), s, case, jnp)
-            parts.append(-jnp.zeros(n + 2, f.dtype).at[index[facets.nodes]].add(f)[:n])
+            parts.append(-jnp.zeros(self.bc.size, f.dtype).at[index[facets.nodes]].add(f)[:n])
         return jnp.concatenate(parts)
 
     @cached_property

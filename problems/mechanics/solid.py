@@ -12,7 +12,7 @@ import numpy as np
 
 from gradient_routes.problems.data import probes
 from gradient_routes.problems.data.displacement_data import DisplacementData
-from gradient_routes.problems.data.motion import Motion, MotionName
+from gradient_routes.problems.data.load_cases import LoadCases
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Phi, Prior
 from gradient_routes.problems.data.units import standard_deviation
@@ -83,12 +83,16 @@ class Solid(Problem):
         if not gripped and not area > 0.0:
             raise InputError(f"{self.name}: loaded={o.loaded} lies on the axis and has no area - choose another face")
         E, measured = o.modulus or 1.0, o.data not in (None, "twin")
+        noise = standard_deviation(o.noise, measured, self.name)
         self.measured = measured
         self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
         if o.direction is not None:
             directions = load_direction(o.direction, top, self.name)[None]
+        found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, noise) if measured else None
         traction = o.traction if o.force is None else o.force / area
         amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
+        if found is not None and found.loads is not None:
+            amplitude, directions = self._by_file(found.loads, amplitude, directions[0], area)
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
         q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
@@ -97,7 +101,7 @@ class Solid(Problem):
             "regions": lambda: design_variables.regions(mesh, law, o.nu, self.log, uniform, E),
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
             "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
-            "traction": lambda: design_variables.tractions(mesh, top, traction * directions[0]),
+            "traction": lambda: design_variables.tractions(mesh, top, amplitude * directions[0]),
             "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d(clamp, top.node_set)),
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
         }
@@ -112,14 +116,13 @@ class Solid(Problem):
         self.affine_at_rest = o.load == "traction" and o.unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
         self.matrix_free = self.solid.symmetric or not use_numpy
-        self.noise, self.seed = standard_deviation(o.noise, measured, self.name), o.seed
+        self.noise, self.seed = noise, o.seed
         self.synthetic = o.data == "twin"
         if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:
             self.notes += (f"nu={o.nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
         if amplitude == 0.0 and o.unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
-        if measured:
-            found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, self.noise)
+        if found is not None:
             self.data = self._from_file(found)
             self.read_as = (*found.notes, *self._load_in_words(o.loaded))
             self.notes += self.read_as
@@ -131,40 +134,46 @@ class Solid(Problem):
             where = o.sensors or ("right" if gripped else o.loaded)
             nodes = np.unique(mesh.geometry.nodes) if where == "everywhere" else mesh.boundary(where).node_set
             self.data = self._without_file(probes.at_nodes(mesh, nodes))
-        self.data = self._with_motion(self.data, o.motion)
+        self.data = self.data.with_motion(o.motion)
         if self.data.reads_nothing():
             raise InputError(f"{self.name}: all sensors sit on clamped nodes and read zero - choose other points")
 
+    def _by_file(self, loads: LoadCases, amplitude: float, direction: Array, area: float) -> tuple[float, Array]:
+        """The amplitude and the directions (cases, d) of a file's load cases."""
+        o = self._options
+        if o["unknown"] == "traction" and len(loads.values) > 1:
+            raise InputError(f"{self.name}: unknown=traction takes one load case, {o['data']} has {len(loads.values)}")
+        if o["force"] is not None and loads.kind != "ratio":
+            raise InputError(f"{self.name}: force= and column load of {o['data']} both state the load - keep one")
+        a = loads.amplitudes(o["load"], amplitude, area, self.name)
+        largest = amplitude if loads.kind == "ratio" else float(a[np.abs(a).argmax()])
+        return largest, np.outer(a / (largest or 1.0), direction)
+
     def _from_file(self, measured: probes.Measured) -> DisplacementData:
-        greatest, size = float(np.abs(measured.d).max()), self.mesh.diameter
+        greatest, size = max(float(np.abs(d).max()) for d in measured.d), self.mesh.diameter
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        return DisplacementData(self.solid, measured.probes, measured.d[None], measured.sigma)
+        return DisplacementData(self.solid, measured.probes, measured.d, measured.sigma)
 
     def _without_file(self, points: probes.Probes) -> DisplacementData:
         """The target displacements; none yet for synthetic data."""
         height = TARGET * (points.x[:, -1] - self.mesh.bounding_box[0, -1])
-        target = height[None, :, None] * self.solid.directions[:, None]
-        return DisplacementData(self.solid, points, None if self.synthetic else target, self.noise)
+        target = tuple(height[:, None] * direction for direction in self.solid.directions)
+        cases = (points,) * len(self.solid.directions)
+        return DisplacementData(self.solid, cases, None if self.synthetic else target, self.noise)
 
     def _load_in_words(self, face: str) -> tuple[str, ...]:
-        """What is applied, for a user who has measured it."""
+        """What is applied, for a user who has measured it: of several cases, in the one of the largest load."""
         solid = self.solid
         if solid.load != "traction":
             return ()
-        F = solid.dead_forces(solid.base, 0, np).sum(axis=(0, 1))
+        k = int(np.linalg.norm(solid.directions, axis=1).argmax())
+        F = solid.dead_forces(solid.base, k, np).sum(axis=(0, 1))
         area = float(solid.loaded.areas(self.mesh.geometry.X, np).sum())
         resultant = ", ".join(f"{f:.4g}" for f in np.where(np.abs(F) > 1e-12 * np.abs(F).max(), F, 0.0))
-        return (f"load: {solid.base.load:.4g} Pa on {face}, {area:.4g} m^2, in all ({resultant}) N",)
-
-    def _with_motion(self, data: DisplacementData, kind: MotionName) -> DisplacementData:
-        """With a motion to eliminate. Raises InputError for data that are all motion."""
-        at = data.probes
-        motion = Motion.of(kind, at.x, at.measured, at.weights, self.mesh.geometry.axisymmetric)
-        if motion is not None and data.d is not None:
-            still = np.zeros((*at.nodes.shape, at.x.shape[1]))
-            motion.check(np.stack([at.residual(still, d) for d in data.d]), self.name)
-        return replace(data, motion=motion)
+        what = f"load of case {k + 1}" if len(solid.directions) > 1 else "load"
+        t = float(solid.base.load * np.linalg.norm(solid.directions[k]))
+        return (f"{what}: {t:.4g} Pa on {face}, {area:.4g} m^2, in all ({resultant}) N",)
 
     def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: AnyDesign) -> Prior:
         """Neighbours are cells that share a facet, and adjacent layers."""

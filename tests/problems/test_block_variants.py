@@ -227,7 +227,7 @@ def test_markers_read_what_the_shape_functions_say(where: str) -> None:
     for element in ("hex8", "tet4", "tet10"):
         block = Block(**SMALL, element=element, markers=7, face=where, components="in-plane", seed=3)
         H = np.array([[0.1, 0.2, 0.3], [0.0, -0.1, 0.4], [0.2, 0.1, 0.5]])
-        U, probes = block.mesh.geometry.X @ H.T, block.data.probes
+        U, probes = block.mesh.geometry.X @ H.T, block.data.probes[0]
         np.testing.assert_allclose(probes.read(U[probes.nodes]), probes.x @ H.T, atol=1e-14)
         normal = 0 if where == "right" else 2
         np.testing.assert_allclose(probes.x[:, normal], 1.0, atol=1e-14)
@@ -238,7 +238,7 @@ def test_measured_points_need_not_be_nodes_nor_whole(tmp_path: Path) -> None:
     path = tmp_path / "d.csv"
     path.write_text("x,y,z,ux,uy,uz\n0.3,0.4,1,0.01,,0.2\n1,1,1,,,0.1\n")
     block = Block(**SMALL, data=str(path))
-    probes = block.data.probes
+    probes = block.data.probes[0]
     assert probes.measured.tolist() == [[True, False, True], [False, False, True]]
     U = block.mesh.geometry.X @ np.diag([0.1, 0.2, 0.3])
     np.testing.assert_allclose(probes.read(U[probes.nodes]), [[0.03, 0.08, 0.3], [0.1, 0.2, 0.3]], atol=1e-14)
@@ -321,7 +321,7 @@ def test_points_outside_a_mesh_are_refused_with_the_box_of_the_mesh(tmp_path: Pa
     moved = replace(mesh, geometry=replace(mesh.geometry, X=mesh.geometry.X + np.array([10.0, 20.0, 30.0])))
     path = tmp_path / "d.csv"
     path.write_text("x,y,z,ux,uy,uz\n11,22,42.012,0,0,1\n")
-    points = read_probes(moved, str(path)).probes
+    points = read_probes(moved, str(path)).probes[0]
     np.testing.assert_allclose(points.read(moved.geometry.X[points.nodes]), [[11.0, 22.0, 42.012]], rtol=1e-12)
     path.write_text("x,y,z,ux,uy,uz\n11,22,42.012,0,0,1\n11,22,42.014,0,0,1\n")
     says = "data row 2 at (11, 22, 42.014) lies outside block, whose box of 3, 4, 12 m begins at (10, 20, 30) (1 of 2"

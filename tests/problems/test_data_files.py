@@ -154,7 +154,7 @@ UNREADABLE: dict[str, tuple[str | bytes, str, dict[str, str]]] = {
     "one -9999": (HEAD + "1,2,3,0.5\n1,2,4,-9999\n", "column ux holds -9999 in 1 of 2 rows", {}),
     "-999 among numbers as large": (HEAD + "1,2,3,800.5\n1,2,4,-999\n1,2,5,1200.5\n1,2,6,-999\n", "-999 in 2 of 4", {}),
     "a sentinel of no name": (HEAD + "1,2,3,2\n1,2,4,-32768\n1,2,5,-32768\n", "a mark of missing values? - ", {}),
-    "loads": ("x,y,z,ux,Load [kN]\n1,2,3,4,5\n", "column Load [kN]: load cases are not read from files yet", {}),
+    "frames": ("x,y,z,ux,Frame\n1,2,3,4,5\n", "column Frame tells cases apart, and as one their rows would be", {}),
     "no such unit": (
         "x [cm],y [cm],z [cm],ux [cm]\n1,2,3,4\n",
         "column x: unit 'cm' is not known - the units are m, mm, um; Pa, kPa, MPa, GPa, N/mm2; N,",
@@ -236,12 +236,12 @@ def test_points_outside_are_counted_and_refused_dropped_or_moved(box: Mesh, file
     said = "2 of 4 points lie outside block, by up to 0.5 m, and are"
     assert dropped.notes == (f"{said} left out",)
     assert snapped.notes == (f"{said} moved to the nearest one inside",)
-    assert dropped.d[:, 0].tolist() == [1.0, 3.0]
-    assert snapped.d[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert dropped.d[0][:, 0].tolist() == [1.0, 3.0]
+    assert snapped.d[0][:, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
     np.testing.assert_allclose(
-        snapped.probes.x, [[0.5, 0.5, 0.5], [0.5, 0.5, 1], [1.0005, 0, 0], [0, 0.5, 0.5]], atol=1e-12
+        snapped.probes[0].x, [[0.5, 0.5, 0.5], [0.5, 0.5, 1], [1.0005, 0, 0], [0, 0.5, 0.5]], atol=1e-12
     )
-    for found in (dropped.probes, snapped.probes):
+    for found in (dropped.probes[0], snapped.probes[0]):
         np.testing.assert_allclose(found.read(box.geometry.X[found.nodes]), found.x, atol=1e-12)
 
 
@@ -258,7 +258,7 @@ def test_points_in_a_hole_are_outside(file: File) -> None:
     path = file(HEAD + "0.5,0.5,0.5,1\n0.3,0.5,0.5,1\n")
     with pytest.raises(InputError, match=re.escape("(1 of 2 rows do, by up to 0.1 m)")):
         probes(holed, path)
-    snapped = probes(holed, path, "snap").probes.x[0] - 0.5
+    snapped = probes(holed, path, "snap").probes[0].x[0] - 0.5
     assert np.abs(snapped).max() == pytest.approx(0.1)
 
 
@@ -302,7 +302,7 @@ REPEATED = HEAD + "0.5,0.5,0.5,1e-3\n0.5,0.5,1,2e-3\n0.5,0.5,0.5,{}\n"
 def test_rows_that_repeat_others_count_once_and_other_values_are_refused(box: Mesh, file: File) -> None:
     found = probes(box, file(REPEATED.format("1e-3")))
     assert found.notes == ("rows that repeat others are left out: 1",)
-    assert found.d[:, 0].tolist() == [1e-3, 2e-3]
+    assert found.d[0][:, 0].tolist() == [1e-3, 2e-3]
     says = (
         "lines 2 and 4: point 0.5, 0.5, 0.5 is given twice, with values that differ by 0.0004; 1 such pairs in all - "
     )
@@ -312,12 +312,12 @@ def test_rows_that_repeat_others_count_once_and_other_values_are_refused(box: Me
         probes(box, file(REPEATED.format("1.4e-3")), noise=4e-5)
     found = probes(box, file(REPEATED.format("1.4e-3")), noise=5e-5)  # 4.2e-4
     assert found.notes == ("pairs of rows that measure one point, within their noise: 1",)
-    assert len(found.d) == 3
+    assert len(found.d[0]) == 3
 
 
 def test_two_rows_may_measure_two_components_of_one_point(box: Mesh, file: File) -> None:
     found = probes(box, file("x,y,z,ux,uz\n0.5,0.5,1,1e-3,\n0.5,0.5,1,,2e-3\n"))
-    assert found.probes.measured.sum() == 2
+    assert found.probes[0].measured.sum() == 2
     assert found.notes == ()
 
 
@@ -340,7 +340,7 @@ def test_the_bar_reads_its_file_alike(file: File) -> None:
     [
         ("node,displacement\n1,0.1\n1,0.2\n", {}, "node 1 is given twice"),
         ("node,displacement\n1,0.1\n2,-999\n", {}, "column displacement holds -999 in 1 of 2 rows"),
-        ("node,displacement [mm],load\n1,0.1,1\n", {}, "column load: load cases are not read"),
+        ("node,displacement [mm],load\n1,0.1,1\n", {}, "column load tells cases apart"),
         ("node [mm],displacement [mm]\n1,0.1\n", {}, "'mm' is a unit of length, not of number - leave the unit out"),
         ("node,displacement\n1,0.1\n", {"noise": "0um"}, "noise=0um - give a standard deviation > 0, or leave it out"),
         ("node,displacement\n1,0.1\n", {"noise": -1e-3}, "noise=-0.001 - give a standard deviation > 0"),
@@ -363,7 +363,7 @@ def test_data_are_weighted_by_their_noise(file: File) -> None:
     """J = sigma^2 / 2 sum of (r_i / sigma_i)^2 with 1 / sigma^2 the mean of 1 / sigma_i^2; so is the observation."""
     block = Block(**SMALL, data=file(NOISY))
     p, u = block.parameters.start, np.linspace(0.1, 0.2, block.n_state)
-    read = block.data.probes.read(block.solid.displacements(u, block.solid.setup(p), 0, block.data.probes.nodes))
+    read = block.data.probes[0].read(block.solid.displacements(u, block.solid.setup(p), 0, block.data.probes[0].nodes))
     r, sigma_i = np.array([read[0, 0] - 1e-5, read[1, 2] - 2e-5]), np.array([1e-6, 4e-6])
     sigma = np.mean(sigma_i**-2.0) ** -0.5
     seen = block.observation(u, p)
@@ -456,7 +456,7 @@ def test_a_mesh_in_mm_and_one_in_m_with_data_in_mm_are_one_problem(file: File, t
         meshio.Mesh(scale * body.geometry.X, [(name, cells)]).write(path)
         found.append(Block(mesh=str(path), mesh_unit=unit, law="linear", unknown="constants", data=data))
     one, other = found
-    np.testing.assert_allclose(one.data.probes.N, other.data.probes.N, atol=1e-13)
+    np.testing.assert_allclose(one.data.probes[0].N, other.data.probes[0].N, atol=1e-13)
     np.testing.assert_allclose(one.mesh.geometry.X, other.mesh.geometry.X, rtol=1e-15)
     told = Block(mesh=str(tmp_path / "mm.vtu"), law="linear", unknown="constants", data=data).notes
     assert "the points are in m beside a mesh in mm (mesh_unit=mm)?" in told

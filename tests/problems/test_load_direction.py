@@ -34,6 +34,12 @@ def test_a_body_that_is_turned_is_stretched_the_same() -> None:
     np.testing.assert_allclose(-stretch(down, "bottom", 2)[::-1], stretch(up, "top", 2), rtol=1e-9)
 
 
+def test_a_grip_moves_along_its_direction() -> None:
+    block = Block(**SOFT, load="displacement", displacement=0.1, direction="0,0.6,-0.8")
+    assert stretch(block, "top", 1) == pytest.approx(0.06)
+    assert stretch(block, "top", 2) == pytest.approx(-0.08)
+
+
 def test_a_force_is_the_resultant() -> None:
     for problem, expected in (
         (Block(n=2, size="1,2,3", force=0.6, direction="-z"), (0.0, 0.0, -0.6)),

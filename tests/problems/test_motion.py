@@ -25,9 +25,9 @@ def moved_block() -> tuple[Block, np.ndarray]:
     block = Block(n=2, derivatives="hand", unknown="layers", layers=2, data="twin", motion="rigid", sensors="right")
     p = np.array([0.1, -0.2])
     still = block.observed(Model(block.twin()).solve(p).u)
-    x = still.data.probes.x
+    x = still.data.probes[0].x
     rigid = SHIFT + np.cross(TURN, x - x.mean(axis=0))
-    return still._with(replace(still.data, d=still.data.d + rigid)), p
+    return still._with(replace(still.data, d=(still.data.d[0] + rigid,))), p
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_the_motion_is_found_and_the_rest_fits(moved: tuple[Block, np.ndarray]) 
 def test_J_is_the_least_over_the_motion(moved: tuple[Block, np.ndarray]) -> None:
     """By least squares over the modes, written down here."""
     block, p = moved[0], moved[1] + 0.3
-    u, probes = Model(block).solve(p).u, block.data.probes
+    u, probes = Model(block).solve(p).u, block.data.probes[0]
     U = block.solid.displacements(u, block.solid.setup(p), 0, probes.nodes)
     r = (probes.read(U) - block.data.d[0]).ravel()
     x = probes.x - probes.x.mean(axis=0)
@@ -80,7 +80,7 @@ def test_the_gradient_is_H_transposed_times_the_residuals(moved: tuple[Block, np
     assert seen.modes.shape == (len(r), 6)
     read = seen.whole.S_u @ state.u  # what the sensors read, motion and all
     assert read == pytest.approx(
-        block.data.probes.read(block.data._probe_displacements(state.u, block.solid.setup(p))[0]).ravel()
+        block.data.probes[0].read(block.data._probe_displacements(state.u, block.solid.setup(p))[0]).ravel()
     )
 
 

@@ -304,7 +304,7 @@ def test_fields_are_in_space_and_data_in_the_plane(tmp_path: Path) -> None:
     path = tmp_path / "d.csv"
     path.write_text("x,y,ux,uy\n0.3,0.4,0.01,\n1,1,,0.1\n")
     plate = Plate(**HAND, data=str(path), unknown="thickness", thickness=0.5)
-    assert plate.data.probes.measured.tolist() == [[True, False], [False, True]]
+    assert plate.data.probes[0].measured.tolist() == [[True, False], [False, True]]
     p = plate.parameters.start
     result = adjoint.prepare(Model(plate), p)(p)
     fields = plate.fields(p, result.u, result.lam, result.gradient)
