@@ -59,6 +59,7 @@ class Plate(Solid):
             str, "edge held: bottom, top, left, right, hole, the file's, a line y=0, or none"
         ] = "bottom",
         fixed: options.Fixed = None,
+        boundary: options.BoundaryOf = "zero",
         loaded: Annotated[str, "edge loaded or gripped"] = "top",
         law: options.Law = "neo-hookean",
         nu: options.Nu = 0.3,
@@ -73,6 +74,7 @@ class Plate(Solid):
         load: options.LoadKind = "traction",
         traction: Annotated[float, "on the loaded edge, in y or along the normal [Pa]"] = 0.2,
         force: options.Force = None,
+        force_noise: options.ForceNoise = None,
         direction: options.Direction = None,
         displacement: Annotated[float, "of the grip, in y [m]"] = 0.2,
         cases: Annotated[int, "load cases: in y, x (traction across: 1/4); a follower's: 1, 1/2"] = 1,

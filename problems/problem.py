@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from gradient_routes.problems.data.regularization import Prior
 
 Array = NDArray[Any]
+Drive = Literal["load", "displacement", "load and displacement"]
 Structure = Literal["spd", "symmetric", "general"]
 Discretization = Literal["quadrature", "stabilization", "mesh"]
 
@@ -231,6 +232,7 @@ class Problem:
                no one in particular
     start_from_data  whether the start of p says nothing of the body that was measured: its size comes from the data
     from_rest  whether data are zero without the load, and so as large as what p is there to explain
+    drive      what moves the body: a load, displacements of its boundary that are known, or both
     measured   whether the data come from a file
     notes      sentences a user should read beside the result
     read_as    those of them that say how a data file was read
@@ -253,6 +255,7 @@ class Problem:
     typical: int | None = None
     start_from_data: bool = False
     from_rest: bool = False
+    drive: Drive = "load"
     measured: bool = False
     notes: tuple[str, ...] = ()
     read_as: tuple[str, ...] = ()
@@ -314,8 +317,9 @@ class Problem:
         return other
 
     def scaled(self, p: Array, factor: float) -> Array | None:
-        """The parameters (n_p,) of a body `factor` times as stiff as that of p: under the same loads a small u is
-        1 / factor times that of p. None where p sets no stiffness, or where u does not depend on it.
+        """The parameters (n_p,) of a body `factor` times as stiff as that of p: what loads add to a small u is
+        1 / factor times that of p, forces of known displacements are `factor` times as large. None where p sets no
+        stiffness, or where no datum depends on it.
         """
         return None
 

@@ -1,7 +1,9 @@
-"""The size of a stiffness that data tell: the one factor by which u at the sensors is as large as it was measured.
+"""The size of a stiffness that data tell: the one factor by which S u is as large as it was measured.
 
-u(c E) = u(E) / c under the same loads, as long as strains are small; |S u / c - d| is least at
-c = <S u, S u> / <S u, d>
+Under the same loads u(c E) = u_0 + u_1(E) / c as long as strains are small, u_0 being the part that known displacements
+of the boundary cause without a load. With S u_1 = r and the data d - S u_0 = s, |r / c - s| is least at
+c = <r, r> / <r, s>. Where displacements alone move the body, u does not change and forces are c F(E):
+c = <r, s> / <r, r>.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from gradient_routes.routes.newton import Solver
 
 NEAR = 0.01  # relative change of c that no longer matters to an optimizer
 TRIES = 12  # solves for c at finite strain
+EXTREME = 1e30  # times as stiff: loads move nothing, and so many times softer known displacements take no force
 STIFFER = 2.0  # where the body gives way under its load
 
 
@@ -37,7 +40,8 @@ def with_measured_start(problem: Problem, solver: Solver | None = None) -> Probl
 def fitted_factor(model: Model, p: Array) -> float | None:
     """c, by linear elasticity, and where that does not hold by solves at c p until c stays; None where data tell none.
 
-    One linear solve, and up to 12 forward solves of a nonlinear problem.
+    One linear solve, two where both loads and displacements are known, and up to 12 forward solves of a nonlinear
+    problem.
     """
     problem = model.problem
     c = small_strain_factor(model, p)
@@ -47,7 +51,7 @@ def fitted_factor(model: Model, p: Array) -> float | None:
         q = problem.scaled(p, c)
         assert q is not None
         try:
-            change = _factor(problem, model.solve(q).u, q)
+            change = _factor(model, model.solve(q).u, q)
         except OUTSIDE:
             change = STIFFER
         if change is None:
@@ -60,21 +64,35 @@ def fitted_factor(model: Model, p: Array) -> float | None:
 
 def small_strain_factor(model: Model, p: Array) -> float | None:
     """c of the body that is linearized at u_0; None where p sets no stiffness, or data tell no size."""
-    problem = model.problem
-    if problem.scaled(p, 1.0) is None:
+    if model.problem.scaled(p, 1.0) is None:
         return None
-    u = model.initial(p)
     try:
-        factors = model.factorize(model.tangent(u, p))
-        return _factor(problem, u - model.solve_linear(factors, model.residual(u, p)), p)
+        return _factor(model, _linear(model, p), p)
     except OUTSIDE:
         return None
 
 
-def _factor(problem: Problem, u: Array, p: Array) -> float | None:
-    """<S u, S u> / <S u, d>."""
+def _linear(model: Model, p: Array) -> Array:
+    """One Newton step from u_0."""
+    u = model.initial(p)
+    factors = model.factorize(model.tangent(u, p))
+    return u - model.solve_linear(factors, model.residual(u, p))
+
+
+def _factor(model: Model, u: Array, p: Array) -> float | None:
+    problem = model.problem
     seen = problem.observation(u, p)
     if seen is None:
         return None
-    size, along = float(seen.predicted @ seen.predicted), float(seen.predicted @ seen.data)
-    return size / along if along > 0.0 and math.isfinite(size / along) and size > 0.0 else None
+    without: Array | float = 0.0
+    if problem.drive != "load":
+        q = problem.scaled(p, EXTREME if problem.drive == "load and displacement" else 1.0 / EXTREME)
+        assert q is not None
+        bare = problem.observation(u if problem.drive == "displacement" else _linear(model, q), q)
+        assert bare is not None
+        without = bare.predicted
+    r, s = seen.predicted - without, seen.data - without
+    size, along = float(r @ r), float(r @ s)
+    if not (along > 0.0 and size > 0.0 and math.isfinite(size / along)):
+        return None
+    return along / size if problem.drive == "displacement" else size / along

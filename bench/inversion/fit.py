@@ -142,7 +142,7 @@ def fit(problem: Problem, found: Evaluation, solver: Solver) -> Fit | None:
         return None
     if seen is None or not len(seen.data):
         return None
-    unloaded = observed(problem, p)
+    unloaded = observed(problem, p) if problem.drive == "load" else None
     if H is None:
         return Fit(Residuals.of(seen, unloaded=unloaded), np.full(len(p), np.nan))
     prior = posterior.prior_rows(problem, p, scale)
@@ -179,12 +179,12 @@ def _thirds(problem: Problem, p: Array, H: Array, scale: Array, seen: Observatio
     x = seen.position
     if x is None or not problem.stated(p) or len(x) < 6 * len(p):
         return {}
-    along = x[:, int(np.ptp(x, axis=0).argmax())]
-    third = np.digitize(along, np.linspace(along.min(), along.max(), 4)[1:-1])
+    along = x[:, int(np.nanargmax(np.nanmax(x, axis=0) - np.nanmin(x, axis=0)))]
+    third = np.digitize(along, np.linspace(np.nanmin(along), np.nanmax(along), 4)[1:-1])
     r, found = seen.predicted - seen.data, []
     kept = inliers(np.abs(r), seen.sigma)
     for k in range(3):
-        rows = (third == k) & kept
+        rows = ((third == k) | np.isnan(along)) & kept  # what has no position, a force, belongs to each
         A, b = H[rows], -r[rows]
         if seen.modes is not None:
             Q, _ = np.linalg.qr(seen.modes[rows])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.data.force_data import ForceData
 from gradient_routes.problems.data.motion import Motion, MotionName, check
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.probes import Probes
@@ -26,6 +27,7 @@ class DisplacementData:
     d (m, d)  [m], None for synthetic data that are not computed yet
     motions   what is eliminated from J
     noise     standard deviation of the noise on d [m]
+    force     what is measured of forces besides
     """
 
     solid: LoadedSolid
@@ -33,6 +35,7 @@ class DisplacementData:
     d: tuple[Array, ...] | None
     noise: float = 0.0
     motions: tuple[Motion, ...] | None = None
+    force: ForceData | None = None
 
     def with_motion(self, kind: MotionName) -> DisplacementData:
         """With a motion to eliminate in each case. Raises InputError for data that are all motion."""
@@ -68,8 +71,9 @@ class DisplacementData:
         """The data of one load case."""
         of = slice(case, case + 1)
         motions = None if self.motions is None else self.motions[of]
+        force = None if self.force is None else self.force.single_case(case)
         solid, d = self.solid.single_case(case), self.require_data()[of]
-        return replace(self, solid=solid, probes=self.probes[of], d=d, motions=motions)
+        return replace(self, solid=solid, probes=self.probes[of], d=d, motions=motions, force=force)
 
     def reads_nothing(self) -> bool:
         """Whether all probes are at clamped nodes."""
@@ -77,7 +81,8 @@ class DisplacementData:
         return not any((bc.index[case][at.nodes] != bc.n_free).any() for case, at in enumerate(self.probes))
 
     def misfit(self, u: Any, p: Any, xp: Any = np) -> Any:
-        return sum(0.5 * (r**2).sum() for r in self._residuals(u, p, xp))
+        of_forces = [] if self.force is None else self.force.residuals(u, p, xp)
+        return sum(0.5 * (r**2).sum() for r in (*self._residuals(u, p, xp), *of_forces))
 
     def _residuals(self, u: Any, p: Any, xp: Any = np) -> list[Any]:
         """P w (S u - d), (m,), of every load case."""
@@ -96,13 +101,18 @@ class DisplacementData:
         several = len(found) > 1
         return {f"{name}, case {k + 1}" if several else name: m for k, of in enumerate(found) for name, m in of.items()}
 
-    def misfit_gradient(self, u: Array, p: Array) -> tuple[Array, Any]:
-        """Derivatives of the misfit with respect to u (n_u,) and the grip displacement."""
+    def misfit_gradient(self, u: Array, p: Array) -> tuple[Array, Array]:
+        """Derivatives of the misfit with respect to u (n_u,) and p (n_p,)."""
         parts = [
             self.solid.bc.assemble(at.forces(r), at.nodes, case)
             for case, (at, r) in enumerate(zip(self.probes, self._residuals(u, p), strict=True))
         ]
-        return np.concatenate([by_u for by_u, _ in parts]), sum(by_a for _, by_a in parts)
+        by_u = np.concatenate([of_case for of_case, _ in parts])
+        by_p = np.full_like(p, sum(by_a for _, by_a in parts) if self.solid.grip_is_parameter else 0.0)
+        if self.force is None:
+            return by_u, by_p
+        more_by_u, more_by_p = self.force.misfit_gradient(u, p)
+        return by_u + more_by_u, by_p + more_by_p
 
     def observation(self, u: Array, p: Array) -> Observation:
         d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
@@ -115,6 +125,8 @@ class DisplacementData:
         if self.probes[0].weights is not None:
             weights = [at.weights[at.measured] for at in self.probes if at.weights is not None]
             seen = seen.weighted(np.concatenate(weights))
+        if self.force is not None:
+            seen = self.force.beside(seen, u, p)
         return seen if self.motions is None else seen.without(self.motions)
 
     def candidates(self) -> Candidates:
@@ -145,7 +157,7 @@ class DisplacementData:
             entries = (probes.N[points].ravel(), (rows.ravel(), at.ravel()))
             S = sparse.csr_array(entries, shape=(len(points), bc.size))
             blocks.append(S[:, : bc.n_free])
-            grips.append(S[:, bc.n_free + 1 :] @ bc.directions[case][:, None])
+            grips.append(S[:, bc.grip] @ bc.directions[case][:, None])
         return sparse.block_diag(blocks, format="csr"), np.concatenate(grips)
 
     @cached_property

@@ -55,31 +55,40 @@ class Observation:
         )
 
     def without(self, motions: Sequence[Motion]) -> Observation:
-        """With the motion of each load case eliminated; S_u is a LinearOperator then."""
+        """With the motion of each load case eliminated; S_u is a LinearOperator then. Data after them do not move."""
         from scipy.linalg import block_diag
         from scipy.sparse.linalg import LinearOperator
 
         S, ends = self.S_u.tocsr(), np.cumsum([len(motion.Q) for motion in motions])
+        still = S[ends[-1] :]
         rows = [slice(end - len(motion.Q), end) for end, motion in zip(ends, motions, strict=True)]
         parts = [motion.sampled(S[of]) for motion, of in zip(motions, rows, strict=True)]
 
         def stacked(v: Array) -> Array:
-            return np.concatenate([part @ v for part in parts])
+            return np.concatenate([*(part @ v for part in parts), still @ v])
 
         def spread(w: Array) -> Array:
-            return np.asarray(sum(part.T @ w[of] for part, of in zip(parts, rows, strict=True)))
+            return np.asarray(
+                sum(part.T @ w[of] for part, of in zip(parts, rows, strict=True)) + still.T @ w[ends[-1] :]
+            )
 
         def projected(v: Array) -> Array:
-            return np.concatenate([motion.projected(v[of]) for motion, of in zip(motions, rows, strict=True)])
+            moving = [motion.projected(v[of]) for motion, of in zip(motions, rows, strict=True)]
+            return np.concatenate([*moving, v[ends[-1] :]])
+
+        S_p = self.S_p
+        if S_p is not None and abs(S_p[: ends[-1]]).sum() > 0.0:
+            S_p = np.stack([projected(column) for column in (S_p @ np.eye(S_p.shape[1])).T], axis=1)
+        modes = block_diag(*(motion.Q for motion in motions))
 
         return replace(
             self,
             predicted=projected(self.predicted),
             data=projected(self.data),
             S_u=LinearOperator(S.shape, matvec=stacked, rmatvec=spread, matmat=stacked, rmatmat=spread, dtype=float),
-            S_p=None if self.S_p is None else np.stack([projected(column) for column in self.S_p.T], axis=1),
+            S_p=S_p,
             whole=self,
-            modes=block_diag(*(motion.Q for motion in motions)),
+            modes=np.pad(modes, ((0, still.shape[0]), (0, 0))),
         )
 
 

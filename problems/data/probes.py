@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.data.boundary_values import BoundaryValues
 from gradient_routes.problems.data.load_cases import CASE, LOAD, LoadCases
 from gradient_routes.problems.data.placing import Outside, place
 from gradient_routes.problems.data.repeats import without_repeats
@@ -16,6 +17,8 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import BRICKS
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.problem import Array
+
+NOWHERE = np.zeros(0, dtype=int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +37,7 @@ class Probes:
     measured: Array
     weights: Array | None = None
 
-    def at(self, rows: Array) -> Probes:
+    def at(self, rows: Array | slice) -> Probes:
         """Some of the points."""
         weights = None if self.weights is None else self.weights[rows]
         return Probes(self.nodes[rows], self.N[rows], self.x[rows], self.measured[rows], weights)
@@ -87,13 +90,15 @@ def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Pro
 @dataclass(frozen=True)
 class Measured:
     """What a file holds: for each load case probes and data d (m, d) [m]; noise sigma [m], 0 if unknown; the loads of
-    its cases, where it names any; and notes on how it was read.
+    its cases, where it names any; displacements of a measured boundary in every case, or none; and notes on how it was
+    read.
     """
 
     probes: tuple[Probes, ...]
     d: tuple[Array, ...]
     sigma: float
     loads: LoadCases | None
+    boundary: tuple[BoundaryValues, ...]
     notes: tuple[str, ...]
 
 
@@ -104,11 +109,12 @@ def read_probes(
     units: str | None = None,
     outside: Outside = "refuse",
     noise: float = 0.0,
+    boundary: Array = NOWHERE,
 ) -> Measured:
     """Read x,y,z and any of ux,uy,uz, of a plane body x,y and ux,uy; an empty cell was not measured.
 
-    See `read_table`, `LoadCases` and `place`. The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y,
-    sigma_z, by which data are then weighted.
+    See `read_table`, `LoadCases` and `place`. Points that tell the displacements of the nodes `boundary` are no data.
+    The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y, sigma_z, by which data are then weighted.
     Raises InputError for a file that cannot be understood, and for points outside the body.
     """
     axes = AXES[: mesh.geometry.dim]
@@ -122,6 +128,15 @@ def read_probes(
         among = sigma[of] if isinstance(sigma, np.ndarray) else sigma
         kept[of], said = without_repeats(path, x[of], d[of], table.lines[of], among)
         repeated.add(said)
+    around = []
+    for k in range(case.max() + 1) if len(boundary) else ():
+        whole = np.flatnonzero(kept & (case == k) & ~np.isnan(d).any(axis=1))
+        among = sigma[whole] if isinstance(sigma, np.ndarray) else sigma
+        X = mesh.geometry.X[boundary]
+        around.append(BoundaryValues.of(X, x[whole], d[whole], among, f"{path}: boundary=measured"))
+        kept[whole[around[-1].used]] = False
+    if not kept.any():
+        raise InputError(f"{path}: all points tell boundary=measured, none is left as a datum - measure inside, too")
     placed = place(mesh, x[kept], path, outside)
     rows = np.flatnonzero(kept)[placed.rows]
     d, case = d[rows], case[rows]
@@ -140,8 +155,10 @@ def read_probes(
     cases = "" if loads is None else loads.said(rows)
     notes = tuple(filter(None, (table.said, cases, *sorted(repeated), *placed.said, doubtful)))
     d = np.where(measured, d, 0.0)
-    of_case = [np.flatnonzero(case == k) for k in range(case.max() + 1)]
-    return Measured(tuple(everything.at(of) for of in of_case), tuple(d[of] for of in of_case), sigma, loads, notes)
+    of_case = [slice(None)] if loads is None else [np.flatnonzero(case == k) for k in range(case.max() + 1)]
+    return Measured(
+        tuple(everything.at(of) for of in of_case), tuple(d[of] for of in of_case), sigma, loads, tuple(around), notes
+    )
 
 
 def groups(axes: str) -> tuple[Group, ...]:

@@ -43,7 +43,7 @@ class NumpyAssembly:
         def product(v: Array) -> Array:
             parts = []
             for case in range(len(self.solid.directions)):
-                v_e = self.solid.bc.displacements(v, 0.0, case, self.nodes, np)
+                v_e = self.solid.bc.variations(v, case, self.nodes)
 
                 def dP(cells: Cells, u_e: Array, q: Any, v_e: Array = v_e) -> Array:
                     return self.material.dP(cells.gradients(u_e), cells.gradients(v_e), q)
@@ -55,12 +55,38 @@ class NumpyAssembly:
 
     def _internal(self, u: Array, s: Setup, case: int, stress: Callable[[Cells, Array, Any], Array]) -> Array:
         """Nodal forces (n_free,) of a stress (3, 3, m) at the points of some cells."""
+        return self.solid.bc.assemble(self._of_cells(u, s, case, stress), self.nodes, case)[0]
+
+    def _of_cells(self, u: Array, s: Setup, case: int, stress: Callable[[Cells, Array, Any], Array]) -> Array:
+        """Forces (n_e, n_a, 3) of the cells."""
         u_e = self.solid.displacements(u, s, case, self.nodes)
         with np.errstate(all="ignore"):  # NaN and infinity are results here, as in JAX
             parts = [
                 cells.forces(stress(cells, u_e, cells.at_points(s.q))) for cells in in_chunks(*self.solid.metric(s, np))
             ]
-        return self.solid.bc.assemble(np.concatenate(parts), self.nodes, case)[0]
+        return np.concatenate(parts)
+
+    def reaction(self, u: Array, p: Array, case: int, e: Array) -> Any:
+        """Work of the stresses along displacements e (n_nodes, d)."""
+        f = self._of_cells(u, self.solid.setup(p), case, lambda cells, u_e, q: self.material.P(cells.gradients(u_e), q))
+        return (f * e[self.nodes]).sum()
+
+    def reaction_by_u(self, u: Array, p: Array, case: int, e: Array) -> Array:
+        """Its derivative (n_u,)."""
+
+        def dP(cells: Cells, u_e: Array, q: Any) -> Array:
+            return self.material.dP(cells.gradients(u_e), cells.gradients(e[self.nodes]), q)
+
+        by_u, n = np.zeros(self.solid.bc.n_u), self.solid.bc.n_free
+        by_u[case * n : (case + 1) * n] = self._internal(u, self.solid.setup(p), case, dP)
+        return by_u
+
+    def reaction_by_p(self, u: Array, p: Array, case: int, e: Array) -> Array:
+        """Its derivative (n_p,)."""
+        s, q_p = self.solid.setup(p), self._q_p(p)
+        return self._along(
+            e[self.nodes], self._by_constants(self.solid.displacements(u, s, case, self.nodes), s, q_p), q_p, len(p)
+        )
 
     def element_tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, selected: Array) -> Array:
         """Entries `pick` of the element matrices: see Solid.tangents."""
@@ -73,9 +99,8 @@ class NumpyAssembly:
 
     def R_p(self, u: Array, p: Array) -> ByProducts:
         """R_p (n_u, n_p): each material constant of a cell depends on one parameter."""
-        solid, derivative = self.solid, self.solid.design.q_p
-        assert derivative is not None, "Block refuses p that is not a material"
-        s, q_p = solid.setup(p), derivative(p)
+        solid = self.solid
+        s, q_p = solid.setup(p), self._q_p(p)
         f_q = [self._by_constants(solid.displacements(u, s, case, self.nodes), s, q_p) for case in self._cases]
 
         def forward(v: Array) -> Array:
@@ -87,12 +112,21 @@ class NumpyAssembly:
         def reverse(lam: Array) -> Array:
             total = np.zeros(len(p))
             for case, f_case in enumerate(f_q):
-                lam_e = solid.bc.displacements(lam, 0.0, case, self.nodes, np)
-                for f, (_, of) in zip(f_case, q_p, strict=True):
-                    total = total + accumulate(of, (f * lam_e).sum(axis=(1, 2)), len(p))
+                total = total + self._along(solid.bc.variations(lam, case, self.nodes), f_case, q_p, len(p))
             return total
 
         return ByProducts(forward, reverse)
+
+    def _q_p(self, p: Array) -> list[tuple[Array, Array]]:
+        derivative = self.solid.design.q_p
+        assert derivative is not None, "Block refuses p that is not a material"
+        return derivative(p)
+
+    @staticmethod
+    def _along(v_e: Array, f_q: list[Array], q_p: list[tuple[Array, Array]], n_p: int) -> Array:
+        """Work (n_p,) of the forces f_q along displacements v_e (n_e, n_a, d)."""
+        parts = zip(f_q, q_p, strict=True)
+        return np.asarray(sum(accumulate(of, (f * v_e).sum(axis=(1, 2)), n_p) for f, (_, of) in parts))
 
     @property
     def _cases(self) -> range:

@@ -18,10 +18,12 @@ class BoundaryConditions:
     """Degrees of freedom in one or more load cases; u concatenates those of all cases.
 
     n_free                     degrees of freedom of one case
-    index (cases, n_nodes, d)  position of a nodal displacement in (u_case, 0, displacement (d,) of the grip)
+    index (cases, n_nodes, d)  position of a nodal displacement in (u_case, 0, displacement (d,) of the grip, values)
     held (n_nodes, d)          components that are zero
     gripped                    node numbers
     directions (cases, d)      displacement of the grip per unit amplitude
+    known (n_k,)               numbers of other nodes whose displacements are known
+    values (cases, n_k d)      these [m]
     """
 
     n_free: int
@@ -29,32 +31,39 @@ class BoundaryConditions:
     held: Array
     gripped: Array
     directions: Array
+    known: Array
+    values: Array
 
     @classmethod
-    def of(cls, mesh: Mesh, held: Array, gripped: Array, directions: Array) -> BoundaryConditions:
-        """From the components that are held, and the directions (cases, d) the grip moves in.
+    def of(
+        cls, mesh: Mesh, held: Array, gripped: Array, directions: Array, known: Array, values: Array
+    ) -> BoundaryConditions:
+        """From the components that are held, the directions (cases, d) the grip moves in, and the nodes (n_k,) with
+        known displacements, values (cases, n_k, d). What is held is held there, too.
 
         Raises InputError if no node is free.
         """
         free = np.zeros(held.shape, dtype=bool)
         free[np.unique(mesh.geometry.nodes)] = True  # a mesh file may contain nodes of no cell
-        free[held] = free[gripped] = False
+        free[held] = free[gripped] = free[known] = False
         n_free = int(free.sum())
         if n_free == 0:
             raise InputError(f"{mesh.who}: no node is free to move - refine the mesh or clamp less")
         index = np.full(held.shape, n_free)
         index[free] = np.arange(n_free)
         index[gripped] = n_free + 1 + np.arange(held.shape[1])
+        index[known] = n_free + 1 + held.shape[1] + np.arange(values[0].size).reshape(values[0].shape)
         index[held] = n_free
         for direction in directions:
             if gripped.size and direction.any() and not (index > n_free)[:, direction != 0.0].any():
                 raise InputError(f"{mesh.who}: the grip moves nothing: what it would move is held - free it")
-        return cls(n_free, np.repeat(index[None], len(directions), axis=0), held, gripped, directions)
+        every_case = np.repeat(index[None], len(directions), axis=0)
+        return cls(n_free, every_case, held, gripped, directions, known, values.reshape(len(values), -1))
 
     def single_case(self, case: int) -> BoundaryConditions:
         """Those of one load case."""
         of = slice(case, case + 1)
-        return replace(self, index=self.index[of], directions=self.directions[of])
+        return replace(self, index=self.index[of], directions=self.directions[of], values=self.values[of])
 
     @property
     def clamped(self) -> Array:
@@ -68,12 +77,25 @@ class BoundaryConditions:
     @property
     def size(self) -> int:
         """How many numbers `index` points to."""
-        return self.n_free + 1 + int(self.held.shape[1])
+        return int(self.n_free + 1 + self.directions.shape[1] + self.values.shape[1])
+
+    @property
+    def grip(self) -> slice:
+        """Where the grip's displacement is among them."""
+        return slice(self.n_free + 1, self.n_free + 1 + self.directions.shape[1])
 
     def displacements(self, u: Any, a: Any, case: int, nodes: Array, xp: Any) -> Any:
         """Displacements (..., d) of nodes in a load case, from u (n_u,) and the amplitude a of the grip."""
+        grip = a * self.directions[case]
+        return self._spread(u, (xp.reshape(0.0 * a, 1), grip, self.values[case]), case, nodes, xp)
+
+    def variations(self, v: Array, case: int, nodes: Array) -> Array:
+        """Displacements (..., d) of nodes by a change v (n_u,) of u."""
+        return np.asarray(self._spread(v, (np.zeros(self.size - self.n_free),), case, nodes, np))
+
+    def _spread(self, u: Any, prescribed: tuple[Any, ...], case: int, nodes: Array, xp: Any) -> Any:
         u_case = u[case * self.n_free : (case + 1) * self.n_free]
-        return xp.concatenate([u_case, xp.reshape(0.0 * a, 1), a * self.directions[case]])[self.index[case][nodes]]
+        return xp.concatenate([u_case, *prescribed])[self.index[case][nodes]]
 
     def dofs(self, nodes: Array, case: int = 0) -> Array:
         """(n_e, d n_a), degrees of freedom of the cells within a case, -1 where constrained; the same in all cases."""
@@ -93,7 +115,7 @@ class BoundaryConditions:
         total = np.bincount(at, weights=flat.real, minlength=self.size)
         if np.iscomplexobj(flat):
             total = total + 1j * np.bincount(at, weights=flat.imag, minlength=self.size)
-        return total[: self.n_free], total[self.n_free + 1 :] @ self.directions[case]
+        return total[: self.n_free], total[self.grip] @ self.directions[case]
 
 
 def rigid_body_modes(geometry: Geometry) -> Array:
@@ -106,11 +128,12 @@ def rigid_body_modes(geometry: Geometry) -> Array:
     return np.stack([np.broadcast_to(motion, r.shape) for motion in motions], axis=-1)
 
 
-def held_components(mesh: Mesh, clamped: str, fixed: str | None) -> Array:
+def held_components(mesh: Mesh, clamped: str, fixed: str | None, supported: Array) -> Array:
     """(n_nodes, d), the components held at zero: all on the face `clamped`, those of `fixed` such as x@left,y@bottom,
     and the radial one on the axis of a body of revolution.
 
-    Raises InputError for what names no face or component, or leaves a part of the body a rigid motion.
+    Raises InputError for what names no face or component, or leaves a part of the body a rigid motion, which the nodes
+    that are `supported` otherwise may prevent.
     """
     geometry = mesh.geometry
     held = np.zeros(geometry.X.shape, dtype=bool)
@@ -124,7 +147,9 @@ def held_components(mesh: Mesh, clamped: str, fixed: str | None) -> Array:
         held[mesh.boundary(face).node_set, AXES.index(axis)] = True
     if geometry.axisymmetric:
         held[np.abs(geometry.X[:, 0]) <= 1e-9 * mesh.diameter, 0] = True
-    _check_held(mesh, held)
+    restrained = held.copy()
+    restrained[supported] = True
+    _check_held(mesh, restrained)
     return held
 
 

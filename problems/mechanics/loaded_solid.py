@@ -105,6 +105,16 @@ class LoadedSolid:
                 Pi -= (f * self.displacements(u, s, case, self.loaded.nodes, jnp)).sum()
         return Pi
 
+    def internal_work(self, u: Any, p: Any, case: int, e: Array) -> Any:
+        """Of the stresses along displacements e (n_nodes, d) [N m per unit of e]; traceable by JAX."""
+        from gradient_routes.problems.jax64 import jax, jnp
+
+        s, nodes = self.setup(p, jnp), self.mesh.geometry.nodes
+        dN, dx = self.metric(s, jnp)
+        u_e = self.displacements(u, s, case, nodes, jnp)
+        along = jnp.asarray(e[nodes], u_e.dtype)
+        return jax.jvp(lambda u_e: self._jax.energy(u_e, s.q, dN, dx), (u_e,), (along,))[1]
+
     def dead_forces(self, s: Setup, case: int, xp: Any) -> Any:
         """Nodal forces (n_f, n_a, d) [N] of the traction on the loaded facets."""
         t = s.load if s.load.ndim == 2 else s.load * self.directions[case][None]  # (n_f or 1, d)
@@ -150,17 +160,31 @@ class LoadedSolid:
     # --- evaluated in NumPy
 
     def initial(self, p: Array) -> Array:
-        """u = 0; with a grip, its displacement interpolated to the clamp by distance."""
+        """u = 0; with a grip, its displacement interpolated to the clamp by distance; where others are known and the
+        law is not linear, the affine function that fits these best.
+        """
         u = np.zeros(self.bc.n_u, dtype=p.dtype)
-        if self.load != "displacement":
-            return u
-        a = self.setup(p).load
-        for case, (direction, ramp) in enumerate(zip(self.directions, self._ramps, strict=True)):
-            moved = ramp[:, None] * direction * a
+        for case, moved in enumerate(self._start(p)):
             index = self.bc.index[case]
             free = index < self.bc.n_free
             u[case * self.bc.n_free + index[free]] = moved[free]
         return u
+
+    def _start(self, p: Array) -> list[Array]:
+        """(n_nodes, d) of every load case; [] where it is 0."""
+        if self.bc.values.size:
+            return [] if self.law.name == "linear" else self._affine
+        if self.load != "displacement":
+            return []
+        a = self.setup(p).load
+        return [r[:, None] * direction * a for direction, r in zip(self.directions, self._ramps, strict=True)]
+
+    @cached_property
+    def _affine(self) -> list[Array]:
+        bc, X = self.bc, self.mesh.geometry.X
+        A = np.concatenate([np.ones((len(X), 1)), X - X[bc.known].mean(axis=0)], axis=1)
+        known = bc.values.reshape(len(bc.values), len(bc.known), -1)
+        return [A @ np.linalg.lstsq(A[bc.known], values, rcond=None)[0] for values in known]
 
     @cached_property
     def _ramps(self) -> list[Array]:
@@ -177,7 +201,7 @@ class LoadedSolid:
 
     def residual(self, u: Array, p: Array) -> Array:
         self.check(p)
-        return self._numpy.residual(u, p) if self.use_numpy else self._compiled(u, p)
+        return self.by_hand.residual(u, p) if self.use_numpy else self._compiled(u, p)
 
     def tangent(self, u: Array, p: Array) -> Any:
         s = self.setup(p)
@@ -185,7 +209,7 @@ class LoadedSolid:
         blocks = []
         for case in range(len(self.directions)):
             u_e = self.displacements(u, s, case, nodes)
-            K = (self._numpy if self.use_numpy else self._jax).element_tangents(u_e, s.q, *metric, self._selected)
+            K = (self.by_hand if self.use_numpy else self._jax).element_tangents(u_e, s.q, *metric, self._selected)
             if self.load == "follower":
                 u_f = self.displacements(u, s, case, self.loaded.nodes)
                 np.subtract.at(K, self.loaded.cells, self._follower_tangents(u_f, s, case))
@@ -228,11 +252,11 @@ class LoadedSolid:
         return jax.jit(columns, static_argnums=3)
 
     def tangent_operator(self, u: Array, p: Array) -> Operator:
-        return self._numpy.R_u(u, p) if self.use_numpy else self._compiled.R_u(u, p)
+        return self.by_hand.R_u(u, p) if self.use_numpy else self._compiled.R_u(u, p)
 
     def R_p(self, u: Array, p: Array) -> Operator:
         """R_p (n_u, n_p)."""
-        return self._numpy.R_p(u, p) if self.use_numpy else self._compiled.R_p(u, p)
+        return self.by_hand.R_p(u, p) if self.use_numpy else self._compiled.R_p(u, p)
 
     @property
     def traced_residual(self) -> Callable[[Any, Any], Any]:
@@ -240,7 +264,8 @@ class LoadedSolid:
         return self._compiled.R
 
     @cached_property
-    def _numpy(self) -> NumpyAssembly:
+    def by_hand(self) -> NumpyAssembly:
+        """Assembly of hand-derived P, A and dP/dq."""
         from gradient_routes.problems.fem.assembly_numpy import NumpyAssembly
 
         return NumpyAssembly(self)

@@ -33,6 +33,7 @@ from gradient_routes.problems.mechanics.design_variables import (
 )
 from gradient_routes.problems.mechanics.load_direction import load_direction
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
+from gradient_routes.problems.mechanics.measured_boundary import force_data, forces, in_words, measured_nodes
 from gradient_routes.problems.problem import (
     Array,
     Fields,
@@ -73,12 +74,14 @@ class Solid(Problem):
                 f"{self.name}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad"
             )
         law.check(law.of_modulus(1.0, o.nu))
-        top, held = mesh.boundary(o.loaded), held_components(mesh, o.clamped, o.fixed)
+        top, known, gripped = mesh.boundary(o.loaded), measured_nodes(mesh, o), o.load == "displacement"
+        held = held_components(mesh, "none" if known.size else o.clamped, o.fixed, known)
         clamp = np.flatnonzero(held.all(axis=1))
+        if known.size:
+            clamp = np.union1d(clamp, np.setdiff1d(known, top.node_set) if gripped else known)
         moved = np.setdiff1d(top.node_set, clamp)
         if not moved.size:
             raise InputError(f"{self.name}: loaded={o.loaded}: all its nodes are clamped - choose another face")
-        gripped = o.load == "displacement"
         area = float(top.areas(mesh.geometry.X, np).sum())
         if not gripped and not area > 0.0:
             raise InputError(f"{self.name}: loaded={o.loaded} lies on the axis and has no area - choose another face")
@@ -88,11 +91,15 @@ class Solid(Problem):
         self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
         if o.direction is not None:
             directions = load_direction(o.direction, top, self.name)[None]
-        found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, noise) if measured else None
+        found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, noise, known) if measured else None
         traction = o.traction if o.force is None else o.force / area
         amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
-        if found is not None and found.loads is not None:
-            amplitude, directions = self._by_file(found.loads, amplitude, directions[0], area)
+        loads = None if found is None else found.loads
+        F = forces(o, loads, self.name) if gripped and measured else None
+        if gripped and known.size:
+            amplitude, directions = 0.0, np.repeat(directions[:1], 1 if loads is None else len(loads.values), axis=0)
+        elif loads is not None:
+            amplitude, directions = self._by_file(loads, amplitude, directions[0], area)
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
         q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
@@ -106,7 +113,11 @@ class Solid(Problem):
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
         }
         base = Setup(q, mesh.geometry.X, np.float64(amplitude))
-        bc = BoundaryConditions.of(mesh, held, moved if gripped else np.zeros(0, dtype=int), directions)
+        values = np.zeros((len(directions), 0, directions.shape[1]))
+        if found is not None and known.size:
+            values = np.stack([of.values for of in found.boundary])
+        gripped_nodes = moved if gripped and not known.size else np.zeros(0, dtype=int)
+        bc = BoundaryConditions.of(mesh, held, gripped_nodes, directions, known, values)
         self.solid = LoadedSolid(mesh, law, bc, top, o.load, directions, choices[o.unknown](), base, use_numpy)
         self.parameters = self.solid.design.parameters
         self.regularization = self._prior(o.alpha, o.phi, o.phi_width, o.unknown)
@@ -123,10 +134,11 @@ class Solid(Problem):
         if amplitude == 0.0 and o.unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if found is not None:
-            self.data = self._from_file(found)
-            self.read_as = (*found.notes, *self._load_in_words(o.loaded))
+            at_clamp = mesh.boundary(o.clamped).node_set if o.clamped != "none" else clamp
+            self.data, said = self._from_file(found, F, np.union1d(clamp, at_clamp))
+            self.read_as = (*found.notes, *said, *self._load_in_words(o.loaded))
             self.notes += self.read_as
-            self.start_from_data = o.modulus is None and o.unknown in FITTED and not gripped
+            self.start_from_data = o.modulus is None and o.unknown in FITTED and (not gripped or F is not None)
         elif o.markers:
             in_plane = o.components == "in-plane"
             self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
@@ -135,6 +147,10 @@ class Solid(Problem):
             nodes = np.unique(mesh.geometry.nodes) if where == "everywhere" else mesh.boundary(where).node_set
             self.data = self._without_file(probes.at_nodes(mesh, nodes))
         self.data = self.data.with_motion(o.motion)
+        if gripped:
+            self.drive = "displacement"
+        elif known.size:
+            self.drive = "load and displacement"
         if self.data.reads_nothing():
             raise InputError(f"{self.name}: all sensors sit on clamped nodes and read zero - choose other points")
 
@@ -149,11 +165,25 @@ class Solid(Problem):
         largest = amplitude if loads.kind == "ratio" else float(a[np.abs(a).argmax()])
         return largest, np.outer(a / (largest or 1.0), direction)
 
-    def _from_file(self, measured: probes.Measured) -> DisplacementData:
+    def _from_file(
+        self, measured: probes.Measured, F: Array | None, apart: Array
+    ) -> tuple[DisplacementData, tuple[str, ...]]:
+        """The data, forces F (cases,) [N] among them, and notes; `apart` are nodes that a measured force is not of."""
+        o, said = self._options, [in_words(measured.boundary)] if measured.boundary else []
         greatest, size = max(float(np.abs(d).max()) for d in measured.d), self.mesh.diameter
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        return DisplacementData(self.solid, measured.probes, measured.d, measured.sigma)
+        data = DisplacementData(self.solid, measured.probes, measured.d, measured.sigma)
+        if F is not None:
+            rms = float(np.sqrt(np.mean(np.concatenate([d.ravel() for d in measured.d]) ** 2)))
+            direction = self.solid.directions[0]
+            force, note = force_data(self.solid, F, direction, apart, o["force_noise"], measured.sigma, rms)
+            return replace(data, force=force), (*said, note)
+        if o["force_noise"] is not None:
+            raise InputError(f"{self.name}: force_noise= is that of force=, which is not given - give both or none")
+        if self.solid.load == "displacement" and o["unknown"] in MATERIAL:
+            said.append("displacements alone tell ratios of moduli, not their size: give force=, or modulus=")
+        return data, tuple(said)
 
     def _without_file(self, points: probes.Probes) -> DisplacementData:
         """The target displacements; none yet for synthetic data."""
@@ -220,8 +250,7 @@ class Solid(Problem):
         return self.regularization, theta, np.ones_like(p) if theta is p else 1.0 / p
 
     def linearize(self, u: Array, p: Array) -> Linearization:
-        J_u, J_a = self.data.misfit_gradient(u, p)
-        J_p = np.full_like(p, J_a if self.solid.grip_is_parameter else 0.0)
+        J_u, J_p = self.data.misfit_gradient(u, p)
         if self.alpha:
             prior, theta, by_p = self.prior(p)
             J_p = J_p + prior.gradient(theta) * by_p
@@ -249,8 +278,9 @@ class Solid(Problem):
     # --- a start of the size of the data
 
     def scaled(self, p: Array, factor: float) -> Array | None:
-        """Where p sets the material, and a load is given rather than a displacement."""
-        if self._options["unknown"] not in MATERIAL or self.solid.load == "displacement":
+        """Where p sets the material, and a load is given or measured rather than displacements alone."""
+        displaced = self.solid.load == "displacement" and self.data.force is None
+        if self._options["unknown"] not in MATERIAL or displaced:
             return None
         return p + np.log(factor) if self._is_log else factor * p
 
@@ -307,12 +337,12 @@ class Solid(Problem):
         """
         solid, design, geometry = self.solid, self.solid.design, self.mesh.geometry
         s, every, cases = solid.setup(p), np.arange(len(geometry.X)), len(solid.directions)
-        vectors = {"u": (u, s)} if lam is None else {"u": (u, s), "lambda": (lam, replace(s, load=0.0 * s.load))}
         point_data, cell_data = {}, {}
         for case in range(cases):
-            for name, (v, at) in vectors.items():
-                numbered = f"{name}_{case + 1}" if cases > 1 else name
-                point_data[numbered] = solid.displacements(v, at, case, every)
+            number = f"_{case + 1}" if cases > 1 else ""
+            point_data[f"u{number}"] = solid.displacements(u, s, case, every)
+            if lam is not None:
+                point_data[f"lambda{number}"] = solid.bc.variations(lam, case, every)
         if design.field is not None:
             name, cells = design.field, design.parameter_of_cell
             value = np.exp(p) if self.log else p

@@ -33,9 +33,13 @@ LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
 Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every row [by its header]"]
 Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]
 OutsideOf = Annotated[Outside, "the file's points outside the body: an error, left out, or moved onto it"]
+BoundaryOf = Annotated[
+    Literal["zero", "measured"], "displacements of the clamped face, and of a grip: measured, the data that lie there"
+]
+ForceNoise = Annotated[float | str | None, "standard deviation of a force that is a datum [1 %] [N]"]
 MotionOf = Annotated[MotionName, "of the camera or the grips, unknown, in the data: eliminated from J"]
 Direction = Annotated[str | None, "of a dead load or a grip: x, -z, 0,0.6,0.8 or normal [the last axis]"]
-Force = Annotated[float | None, "total on the loaded face instead of traction= [N]"]
+Force = Annotated[float | None, "total on the loaded face, instead of traction=, or measured on a grip [N]"]
 Noise = Annotated[float | str | None, "standard deviation of a file's data, added to a twin's [m], or 0.4um"]
 Seed = Annotated[int, "of noise and markers"]
 Alpha = Annotated[float, "weight of Phi"]
@@ -86,6 +90,7 @@ def _check_counts(who: str, o: SimpleNamespace, axes: str) -> None:
 def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
     meshed, measured, gripped = o.mesh is not None, o.data not in (None, "twin"), o.load == "displacement"
     counts = {"n": o.n != 4} | {f"n{axis}": getattr(o, f"n{axis}") for axis in axes}
+    at_data, forced = o.boundary == "measured", o.load == "traction" or (gripped and measured)
     element = o.element != ("hex8" if axes == "xyz" else "quad4")
     check_applies(
         who,
@@ -95,9 +100,12 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, True, {"columns": o.columns, "units": o.units, "outside": o.outside != "refuse"}),
+        ("data=FILE", measured, True, {"boundary": at_data}),
+        ("boundary=measured", at_data, False, {"displacement": o.displacement != 0.2}),
+        ("load=displacement and data=FILE", gripped and measured, True, {"force_noise": o.force_noise is not None}),
         ("load=follower", o.load == "follower", False, {"direction": o.direction}),
         ("cases", o.cases > 1, False, {"direction": o.direction}),
-        ("load=traction", o.load == "traction", True, {"force": o.force is not None}),
+        ("load=traction, or a grip and data=FILE", forced, True, {"force": o.force is not None}),
         ("force", o.force is not None, False, {"traction": o.traction != 0.2}),
         ("data", o.data is not None, True, {"motion": o.motion != "none"}),
         ("data=FILE", measured, False, {"sensors": o.sensors, "markers": o.markers, "cases": o.cases > 1}),
@@ -129,5 +137,7 @@ def _check_unknown(who: str, o: SimpleNamespace) -> None:
         raise InputError(
             f"{who}: unknown=traction with load={o.load}, cases={o.cases} - it takes one case of load=traction"
         )
+    if o.unknown == "load" and o.load == "displacement" and o.boundary == "measured":
+        raise InputError(f"{who}: unknown=load with boundary=measured - the displacements of the grip are known")
     if o.derivatives == "hand" and o.unknown not in MATERIAL:
         raise InputError(f"{who}: derivatives=hand are by material constants, not by {o.unknown} - take derivatives=ad")
