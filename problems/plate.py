@@ -60,6 +60,7 @@ class Plate(Solid):
         ] = "bottom",
         fixed: options.Fixed = None,
         boundary: options.BoundaryOf = "zero",
+        support: options.SupportOf = "clamp",
         loaded: Annotated[str, "edge loaded or gripped"] = "top",
         law: options.Law = "neo-hookean",
         nu: options.Nu = 0.3,

@@ -108,7 +108,9 @@ class DisplacementData:
             for case, (at, r) in enumerate(zip(self.probes, self._residuals(u, p), strict=True))
         ]
         by_u = np.concatenate([of_case for of_case, _ in parts])
-        by_p = np.full_like(p, sum(by_a for _, by_a in parts) if self.solid.grip_is_parameter else 0.0)
+        by_p = np.zeros_like(p)
+        if self.solid.grip_is_parameter:
+            by_p[0] = sum(by_a for _, by_a in parts)
         if self.force is None:
             return by_u, by_p
         more_by_u, more_by_p = self.force.misfit_gradient(u, p)
@@ -119,7 +121,7 @@ class DisplacementData:
         S_u, S_a = self._sampling_matrix
         predicted = np.concatenate([at.read(U[case])[at.measured] for case, at in enumerate(self.probes)])
         data = np.concatenate([d[case][at.measured] for case, at in enumerate(self.probes)])
-        S_p = S_a if self.solid.grip_is_parameter else None
+        S_p = np.pad(S_a, ((0, 0), (0, len(p) - 1))) if self.solid.grip_is_parameter else None
         position = np.concatenate([at.x[np.nonzero(at.measured)[0]] for at in self.probes])
         seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=position)
         if self.probes[0].weights is not None:

@@ -32,6 +32,8 @@ class NumpyAssembly:
         parts = []
         for case in range(len(solid.directions)):
             f = self._internal(u, s, case, lambda cells, u_e, q: self.material.P(cells.gradients(u_e), q))
+            if solid.springs is not None:
+                f = f + self._of_springs(solid.displacements(u, s, case, solid.springs.facets.nodes), s.k, case)
             external = solid.external_forces(u, s, case)
             parts.append(f if external is None else f - solid.bc.assemble(external, solid.loaded.nodes, case)[0])
         return np.concatenate(parts)
@@ -48,10 +50,19 @@ class NumpyAssembly:
                 def dP(cells: Cells, u_e: Array, q: Any, v_e: Array = v_e) -> Array:
                     return self.material.dP(cells.gradients(u_e), cells.gradients(v_e), q)
 
-                parts.append(self._internal(u, s, case, dP))
+                part, springs = self._internal(u, s, case, dP), self.solid.springs
+                if springs is not None:
+                    part = part + self._of_springs(self.solid.bc.variations(v, case, springs.facets.nodes), s.k, case)
+                parts.append(part)
             return np.concatenate(parts)
 
         return ByProducts(product, product)
+
+    def _of_springs(self, u_f: Array, k: Any, case: int) -> Array:
+        """Nodal forces (n_free,) of springs at the displacements u_f of their facets' cells."""
+        springs = self.solid.springs
+        assert springs is not None
+        return self.solid.bc.assemble(springs.forces(u_f, k), springs.facets.nodes, case)[0]
 
     def _internal(self, u: Array, s: Setup, case: int, stress: Callable[[Cells, Array, Any], Array]) -> Array:
         """Nodal forces (n_free,) of a stress (3, 3, m) at the points of some cells."""
@@ -102,20 +113,29 @@ class NumpyAssembly:
         solid = self.solid
         s, q_p = solid.setup(p), self._q_p(p)
         f_q = [self._by_constants(solid.displacements(u, s, case, self.nodes), s, q_p) for case in self._cases]
+        f_k = [self._by_springs(u, s, p, case) for case in self._cases]  # of p's last component
 
         def forward(v: Array) -> Array:
             forces = (sum(f * v[of, None, None] for f, (_, of) in zip(f_case, q_p, strict=True)) for f_case in f_q)
-            return np.concatenate(
-                [solid.bc.assemble(np.asarray(f), self.nodes, case)[0] for case, f in enumerate(forces)]
-            )
+            parts = [solid.bc.assemble(np.asarray(f), self.nodes, case)[0] for case, f in enumerate(forces)]
+            return np.asarray(np.concatenate(parts) + v[-1] * np.concatenate(f_k))
 
         def reverse(lam: Array) -> Array:
             total = np.zeros(len(p))
+            total[-1] = lam @ np.concatenate(f_k)
             for case, f_case in enumerate(f_q):
                 total = total + self._along(solid.bc.variations(lam, case, self.nodes), f_case, q_p, len(p))
             return total
 
         return ByProducts(forward, reverse)
+
+    def _by_springs(self, u: Array, s: Setup, p: Array, case: int) -> Array:
+        """Nodal forces (n_free,) of the springs per unit of the last of p; 0 without springs."""
+        springs = self.solid.springs
+        if springs is None:
+            return np.zeros(self.solid.bc.n_free)
+        u_f = self.solid.displacements(u, s, case, springs.facets.nodes)
+        return self._of_springs(u_f, springs.k_p(p), case)
 
     def _q_p(self, p: Array) -> list[tuple[Array, Array]]:
         derivative = self.solid.design.q_p

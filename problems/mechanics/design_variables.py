@@ -35,11 +35,13 @@ class Setup:
     q     material constants, numbers or (n_e,) [Pa]
     X     nodal positions (n_nodes, d) [m]
     load  the amplitude [Pa] or [m], or tractions (n_f, d) [Pa]
+    k     stiffness of a support on springs [Pa/m]
     """
 
     q: tuple[Any, ...]
     X: Any
     load: Any
+    k: Any = 0.0
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from gradient_routes.problems.fem.facets import Facets
 from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, GeneralPattern, SymmetricPattern
 from gradient_routes.problems.mechanics.design_variables import DesignVariables, Setup
+from gradient_routes.problems.mechanics.springs import Springs
 from gradient_routes.problems.problem import Array, Operator
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class LoadedSolid:
     directions (cases, d)  traction or grip displacement per unit amplitude; of a follower load, the last is its normal
                            part
     base                   the setup for everything that p does not set
+    springs                that hold a face in place of a clamp
     use_numpy              take P, A and dP/dq from hand-derived NumPy code instead of JAX
     """
 
@@ -48,6 +50,7 @@ class LoadedSolid:
     directions: Array
     design: DesignVariables
     base: Setup
+    springs: Springs | None = None
     use_numpy: bool = False
 
     @property
@@ -100,6 +103,9 @@ class LoadedSolid:
         Pi = 0.0
         for case in range(len(self.directions)):
             Pi += self._jax.energy(self.displacements(u, s, case, self.mesh.geometry.nodes, jnp), s.q, dN, dx)
+            if self.springs is not None:
+                u_f = self.displacements(u, s, case, self.springs.facets.nodes, jnp)
+                Pi += 0.5 * (u_f * self.springs.forces(u_f, s.k, jnp)).sum()
             if self.load == "traction":
                 f = self.dead_forces(s, case, jnp)
                 Pi -= (f * self.displacements(u, s, case, self.loaded.nodes, jnp)).sum()
@@ -213,6 +219,10 @@ class LoadedSolid:
             if self.load == "follower":
                 u_f = self.displacements(u, s, case, self.loaded.nodes)
                 np.subtract.at(K, self.loaded.cells, self._follower_tangents(u_f, s, case))
+            if self.springs is not None:
+                more = self.springs.matrices(s.k, self._selected)
+                K = K.astype(np.result_type(K, more), copy=False)
+                np.add.at(K, self.springs.facets.cells, more)
             blocks.append(self.pattern.assemble(K))
         return blocks[0] if len(blocks) == 1 else BlockDiagonal(tuple(blocks))
 

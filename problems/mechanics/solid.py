@@ -34,6 +34,7 @@ from gradient_routes.problems.mechanics.design_variables import (
 from gradient_routes.problems.mechanics.load_direction import load_direction
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.mechanics.measured_boundary import force_data, forces, in_words, measured_nodes
+from gradient_routes.problems.mechanics.springs import Springs
 from gradient_routes.problems.problem import (
     Array,
     Fields,
@@ -75,7 +76,10 @@ class Solid(Problem):
             )
         law.check(law.of_modulus(1.0, o.nu))
         top, known, gripped = mesh.boundary(o.loaded), measured_nodes(mesh, o), o.load == "displacement"
-        held = held_components(mesh, "none" if known.size else o.clamped, o.fixed, known)
+        self.log = o.parametrization != "raw"
+        springs = Springs.on(mesh, o.clamped, self.log) if o.support == "springs" else None
+        supported = known if springs is None else springs.facets.node_set
+        held = held_components(mesh, "none" if supported.size else o.clamped, o.fixed, supported)
         clamp = np.flatnonzero(held.all(axis=1))
         if known.size:
             clamp = np.union1d(clamp, np.setdiff1d(known, top.node_set) if gripped else known)
@@ -88,7 +92,7 @@ class Solid(Problem):
         E, measured = o.modulus or 1.0, o.data not in (None, "twin")
         noise = standard_deviation(o.noise, measured, self.name)
         self.measured = measured
-        self.log, uniform = o.parametrization != "raw", o.data is not None or o.modulus is not None
+        uniform = o.data is not None or o.modulus is not None
         if o.direction is not None:
             directions = load_direction(o.direction, top, self.name)[None]
         found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, noise, known) if measured else None
@@ -109,7 +113,7 @@ class Solid(Problem):
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
             "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
             "traction": lambda: design_variables.tractions(mesh, top, amplitude * directions[0]),
-            "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d(clamp, top.node_set)),
+            "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d([*clamp, *supported], top.node_set)),
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
         }
         base = Setup(q, mesh.geometry.X, np.float64(amplitude))
@@ -118,7 +122,9 @@ class Solid(Problem):
             values = np.stack([of.values for of in found.boundary])
         gripped_nodes = moved if gripped and not known.size else np.zeros(0, dtype=int)
         bc = BoundaryConditions.of(mesh, held, gripped_nodes, directions, known, values)
-        self.solid = LoadedSolid(mesh, law, bc, top, o.load, directions, choices[o.unknown](), base, use_numpy)
+        design = choices[o.unknown]()
+        design = design if springs is None else springs.beside(design, E / mesh.diameter)
+        self.solid = LoadedSolid(mesh, law, bc, top, o.load, directions, design, base, springs, use_numpy)
         self.parameters = self.solid.design.parameters
         self.regularization = self._prior(o.alpha, o.phi, o.phi_width, o.unknown)
         self.n_state = bc.n_u
@@ -210,9 +216,15 @@ class Solid(Problem):
         kind = phi or ("tikhonov" if unknown in FIELDS else "amplitude")
         f2t = self.mesh.skfem_mesh.f2t
         pairs = np.asarray(f2t.T[f2t[1] != -1]) if unknown in CELLWISE else None
-        prior = Prior(alpha, kind, width, pairs, self.parameters.start, self.parameters.scale)
+        n, scale = len(self.parameters), self.parameters.scale.copy()
+        if self.solid.springs is not None:  # k has no neighbours, and no prior
+            pairs = np.stack([np.arange(1, n - 1), np.arange(n - 2)], axis=1) if unknown == "layers" else pairs
+            scale[-1] = np.inf
+        prior = Prior(alpha, kind, width, pairs, self.parameters.start, scale)
         if kind == "amplitude" and unknown in MODULI:
-            prior = replace(prior, origin=self._theta(self.parameters.start), scale=1.0)
+            prior = replace(
+                prior, origin=self._theta(self.parameters.start), scale=np.where(np.isinf(scale), scale, 1.0)
+            )
         prior.check(self.name)
         return prior
 
@@ -269,11 +281,13 @@ class Solid(Problem):
         if o["mesh"] is not None or unknown in ("traction", "shape"):
             return None
         doubled = {name: 2 * (o[name] or o["n"]) for name in ("nx", "ny", "nz") if name in o}
-        layers = len(p) if unknown == "layers" else None
+        layers = len(p) - (self.solid.springs is not None) if unknown == "layers" else None
         finer = type(self)(**o | doubled | {"n": 2 * o["n"], "layers": layers})
         if unknown not in ("modulus", "thickness"):
             return finer, p
-        return finer, prolongate(p, self.mesh.geometry.centres, finer.mesh.geometry.centres)
+        n = len(self.mesh.geometry.centres)
+        fine = prolongate(p[:n], self.mesh.geometry.centres, finer.mesh.geometry.centres)
+        return finer, np.append(fine, p[n:])
 
     # --- a start of the size of the data
 
@@ -282,7 +296,10 @@ class Solid(Problem):
         displaced = self.solid.load == "displacement" and self.data.force is None
         if self._options["unknown"] not in MATERIAL or displaced:
             return None
-        return p + np.log(factor) if self._is_log else factor * p
+        q = p + np.log(factor) if self._is_log else factor * p
+        if self.solid.springs is not None and self.log:
+            q[-1] = p[-1] + np.log(factor)
+        return q
 
     def stiffened(self, factor: float) -> Solid:
         start, o = self.scaled(self.parameters.start, factor), self._options
@@ -290,6 +307,8 @@ class Solid(Problem):
             raise NotOffered(f"{self.name}: unknown={o['unknown']} with load={o['load']} has no stiffness to multiply")
         other = copy.copy(self)
         scale = self.parameters.scale * (1.0 if self._is_log else factor)
+        if self.solid.springs is not None and self.log:
+            scale[-1] = 1.0
         other.parameters = replace(self.parameters, start=start, scale=scale)
         other.regularization = other._prior(self.alpha, o["phi"], o["phi_width"], o["unknown"])
         return other
@@ -299,11 +318,12 @@ class Solid(Problem):
         return self.log and self.solid.design.field is not None
 
     def stated(self, p: Array) -> dict[str, Any]:
-        """Young's modulus and Poisson's ratio, where p are Lame's constants."""
+        """Young's modulus and Poisson's ratio, where p are Lame's constants, and the stiffness of springs."""
+        k = {} if self.solid.springs is None else {"k [Pa/m]": self.solid.springs.k(p)}
         if self._options["unknown"] != "constants" or self.solid.law.constants != ("mu", "lam"):
-            return {}
-        mu, lam = p
-        return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)}
+            return k
+        mu, lam = p[:2]
+        return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)} | k
 
     # --- synthetic data
 
@@ -350,7 +370,8 @@ class Solid(Problem):
             cell_data = {name: value[cells], f"dJ_d{name}": by_value[cells]}
         if design.moved_nodes is not None:
             point_data["dJ_dX"] = np.zeros_like(s.X)
-            point_data["dJ_dX"][design.moved_nodes] = gradient.reshape(-1, geometry.dim)
+            moved = design.moved_nodes
+            point_data["dJ_dX"][moved] = gradient[: moved.size * geometry.dim].reshape(-1, geometry.dim)
         return Fields(in_space(s.X), *geometry.for_meshio(), {k: in_space(v) for k, v in point_data.items()}, cell_data)
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:

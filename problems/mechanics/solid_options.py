@@ -33,6 +33,9 @@ LoadKind = Annotated[Load, "dead; a grip's; along the deformed normal"]
 Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every row [by its header]"]
 Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]
 OutsideOf = Annotated[Outside, "the file's points outside the body: an error, left out, or moved onto it"]
+SupportOf = Annotated[
+    Literal["clamp", "springs"], "of the clamped face: held, or on springs of one stiffness per area k, unknown besides"
+]
 BoundaryOf = Annotated[
     Literal["zero", "measured"], "displacements of the clamped face, and of a grip: measured, the data that lie there"
 ]
@@ -101,6 +104,8 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, True, {"columns": o.columns, "units": o.units, "outside": o.outside != "refuse"}),
         ("data=FILE", measured, True, {"boundary": at_data}),
+        ("boundary=measured", at_data, False, {"support": o.support != "clamp"}),
+        ("clamped", o.clamped != "none", True, {"support": o.support != "clamp"}),
         ("boundary=measured", at_data, False, {"displacement": o.displacement != 0.2}),
         ("load=displacement and data=FILE", gripped and measured, True, {"force_noise": o.force_noise is not None}),
         ("load=follower", o.load == "follower", False, {"direction": o.direction}),
