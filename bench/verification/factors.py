@@ -25,6 +25,7 @@ from gradient_routes.routes.route import Result
 STEPS = (0.01, 1.0, 100.0)  # times the usual one
 EXACT = 1e-9  # relative error of derivatives by complex steps: rounding, summed over many elements
 DIFFERENCED = 1e-6  # the same by central differences
+TINY = 1e-6  # of |J_u| |u|: |J_p v| below which it is compared with that
 SOLVED = 1e-7  # relative residual of solves to 1e-12, with their condition
 CONVERGED = 1e-9  # forward residual
 ASKED = 10.0  # times the tolerance of a solve: it is measured in another norm
@@ -42,9 +43,9 @@ def along(f: Callable[[Array], Array], x: Array, v: Array, exact: bool, times: f
     return np.asarray((f(x + h * v) - f(x - h * v)) / (2.0 * h))
 
 
-def relative(a: Array, b: Array) -> float:
-    """|a - b| / |b|, absolute where b is zero."""
-    return float(np.linalg.norm(a - b) / (np.linalg.norm(b) or 1.0))
+def relative(a: Array, b: Array, least: float = 0.0) -> float:
+    """|a - b| / max(|b|, least), absolute where both are zero."""
+    return float(np.linalg.norm(a - b) / (max(float(np.linalg.norm(b)), least) or 1.0))
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,12 @@ class Function:
         dtype = np.result_type(u, p)
         return self.f(u.astype(dtype), p.astype(dtype))
 
-    def off(self, given: Array, f: Callable[[Array], Array], x: Array, v: Array) -> float:
-        """|given - df/dx v| relative; the least of three steps where differences are central: no one step suits all."""
+    def off(self, given: Array, f: Callable[[Array], Array], x: Array, v: Array, least: float = 0.0) -> float:
+        """|given - df/dx v| relative to it, or to `least`; the least of three steps where differences are central: no
+        one step suits all.
+        """
         steps = (1.0,) if self.exact else STEPS
-        return min(relative(given, along(f, x, v, self.exact, times)) for times in steps)
+        return min(relative(given, along(f, x, v, self.exact, times), least) for times in steps)
 
 
 class Factors:
@@ -91,13 +94,14 @@ class Factors:
         yield _derivative("dR/dp", off, R, "R", "" if off <= R.limit else f", {self._column()}")
         yield _derivative("R_u", self._by_u(R, R_u @ du, du), R, "R")
         yield _derivative("J_u", self._by_u(J, np.asarray(lin.J_u @ du), du), J, "J")
-        yield _derivative("J_p", self._by_p(J, np.asarray(lin.J_p @ v), v), J, "J")
+        least = TINY * norm(lin.J_u) * norm(self.u)  # at the start that a datum tells, J_p may be rounding
+        yield _derivative("J_p", self._by_p(J, np.asarray(lin.J_p @ v), v, least), J, "J")
         yield _identity("<lam, R_p v> = <R_p^T lam, v>", lam * (lin.R_p @ v), (lin.R_p.T @ lam) * v)
         yield _identity("<lam, R_u w> = <R_u^T lam, w>", lam * (R_u @ du), (R_u.T @ lam) * du)
 
-    def _by_p(self, f: Function, given: Array, v: Array) -> float:
+    def _by_p(self, f: Function, given: Array, v: Array, least: float = 0.0) -> float:
         """|given - df/dp v| relative."""
-        return f.off(given, lambda p: f(self.u, p), self.p, v)
+        return f.off(given, lambda p: f(self.u, p), self.p, v, least)
 
     def _by_u(self, f: Function, given: Array, v: Array) -> float:
         """|given - df/du v| relative."""

@@ -44,7 +44,9 @@ def forces(o: SimpleNamespace, loads: LoadCases | None, who: str) -> Array | Non
     if loads is None:
         return None if o.force is None else np.array([o.force])
     if o.boundary == "measured":
-        if loads.kind == "force" and o.force is None:
+        if loads.kind == "force":
+            if o.force is not None:
+                raise InputError(f"{who}: force= and column load of {o.data} both state the force - keep one")
             return loads.values
         if loads.kind == "ratio" and o.force is not None:
             return np.asarray(o.force * loads.values)

@@ -137,7 +137,7 @@ class Solid(Problem):
         self.synthetic = o.data == "twin"
         if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:
             self.notes += (f"nu={o.nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
-        if amplitude == 0.0 and o.unknown in MATERIAL:
+        if amplitude == 0.0 and o.unknown in MATERIAL and not known.size:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if found is not None:
             at_clamp = mesh.boundary(o.clamped).node_set if o.clamped != "none" else clamp
