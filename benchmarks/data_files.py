@@ -31,7 +31,7 @@ def main() -> None:
                 rows = 1e3 * np.random.default_rng(seed).uniform(size=(POINTS // 20, 6))
                 np.savetxt(file, rows, fmt="%.7g", delimiter=",")
         for what, read in (
-            ("read", lambda: read_table(path, groups(3))),
+            ("read", lambda: read_table(path, groups("xyz"))),
             ("read and located", lambda: read_probes(mesh, str(path))),
         ):
             wall, cpu = time.perf_counter(), time.process_time()
