@@ -43,7 +43,7 @@ class Block(Solid):
         element: Annotated[SolidElement, "of the box; tetrahedra split each of its bricks in six"] = "hex8",
         mesh: Annotated[str | None, "mesh file of hexahedra or tetrahedra that meshio reads [the box]"] = None,
         mesh_unit: options.MeshUnit = "m",
-        clamped: Annotated[str, "face held: a name (bottom, top, left, ... or the file's) or a plane, z=0"] = "bottom",
+        clamped: Annotated[str, "faces held: names (bottom, top,left, ... or the file's) or a plane, z=0"] = "bottom",
         fixed: options.Fixed = None,
         boundary: options.BoundaryOf = "zero",
         support: options.SupportOf = "clamp",

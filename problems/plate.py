@@ -56,7 +56,7 @@ class Plate(Solid):
         mesh: Annotated[str | None, "mesh file of quadrilaterals or triangles that meshio reads [the body]"] = None,
         mesh_unit: options.MeshUnit = "m",
         clamped: Annotated[
-            str, "edge held: bottom, top, left, right, hole, the file's, a line y=0, or none"
+            str, "edges held: bottom, top,left, right, hole, the file's, a line y=0, or none"
         ] = "bottom",
         fixed: options.Fixed = None,
         boundary: options.BoundaryOf = "zero",

@@ -128,8 +128,15 @@ def rigid_body_modes(geometry: Geometry) -> Array:
     return np.stack([np.broadcast_to(motion, r.shape) for motion in motions], axis=-1)
 
 
+def nodes_of_faces(mesh: Mesh, faces: str) -> Array:
+    """The nodes of one face or of several, such as left,top; `none` has none. Raises InputError."""
+    if faces == "none":
+        return np.zeros(0, dtype=int)
+    return np.unique(np.concatenate([mesh.boundary(face.strip()).node_set for face in faces.split(",")]))
+
+
 def held_components(mesh: Mesh, clamped: str, fixed: str | None, supported: Array) -> Array:
-    """(n_nodes, d), the components held at zero: all on the face `clamped`, those of `fixed` such as x@left,y@bottom,
+    """(n_nodes, d), the components held at zero: all on the faces `clamped`, those of `fixed` such as x@left,y@bottom,
     and the radial one on the axis of a body of revolution.
 
     Raises InputError for what names no face or component, or leaves a part of the body a rigid motion, which the nodes
@@ -137,8 +144,7 @@ def held_components(mesh: Mesh, clamped: str, fixed: str | None, supported: Arra
     """
     geometry = mesh.geometry
     held = np.zeros(geometry.X.shape, dtype=bool)
-    if clamped != "none":
-        held[mesh.boundary(clamped).node_set] = True
+    held[nodes_of_faces(mesh, clamped)] = True
     for item in fixed.split(",") if fixed else ():
         axis, at, face = (part.strip() for part in item.partition("@"))
         if not at or axis not in [*AXES[: geometry.dim]]:

@@ -12,6 +12,7 @@ from gradient_routes.problems.data.force_data import DEFAULT_NOISE, ForceData
 from gradient_routes.problems.data.load_cases import LoadCases
 from gradient_routes.problems.data.units import quantity
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.fem.boundary_conditions import nodes_of_faces
 from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.mechanics.reaction import Reaction
@@ -19,13 +20,15 @@ from gradient_routes.problems.problem import Array
 
 
 def measured_nodes(mesh: Mesh, o: SimpleNamespace) -> Array:
-    """The nodes (n_k,) of the face that is clamped, and of the loaded one where it has a grip. Raises InputError."""
+    """The nodes (n_k,) of the faces that are clamped, and of the loaded one where it has a grip. Raises InputError."""
     if o.boundary != "measured":
         return np.zeros(0, dtype=int)
-    faces = [face for face, holds in ((o.clamped, o.clamped != "none"), (o.loaded, o.load == "displacement")) if holds]
-    if not faces:
+    nodes = nodes_of_faces(mesh, o.clamped)
+    if o.load == "displacement":
+        return np.union1d(nodes, mesh.boundary(o.loaded).node_set)
+    if not nodes.size:
         raise InputError(f"{mesh.who}: boundary=measured with clamped=none and load={o.load} is of no face - clamp one")
-    return np.unique(np.concatenate([mesh.boundary(face).node_set for face in faces]))
+    return nodes
 
 
 def in_words(found: Sequence[BoundaryValues]) -> str:

@@ -17,7 +17,7 @@ from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Phi, Prior
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered
-from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, held_components
+from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, held_components, nodes_of_faces
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
 from gradient_routes.problems.mechanics import design_variables
@@ -140,8 +140,8 @@ class Solid(Problem):
         if amplitude == 0.0 and o.unknown in MATERIAL and not known.size:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if found is not None:
-            at_clamp = mesh.boundary(o.clamped).node_set if o.clamped != "none" else clamp
-            self.data, said = self._from_file(found, F, np.union1d(clamp, at_clamp))
+            apart = np.union1d(clamp, nodes_of_faces(mesh, o.clamped))
+            self.data, said = self._from_file(found, F, apart)
             self.read_as = (*found.notes, *said, *self._load_in_words(o.loaded))
             self.notes += self.read_as
             self.start_from_data = o.modulus is None and o.unknown in FITTED and (not gripped or F is not None)
