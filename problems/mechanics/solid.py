@@ -188,7 +188,7 @@ class Solid(Problem):
         if o["force_noise"] is not None:
             raise InputError(f"{self.name}: force_noise= is that of force=, which is not given - give both or none")
         if self.solid.load == "displacement" and o["unknown"] in MATERIAL:
-            said.append("displacements alone tell ratios of moduli, not their size: give force=, or modulus=")
+            said.append("displacements alone tell ratios of moduli; their size stays that of the start: give force=")
         return data, tuple(said)
 
     def _without_file(self, points: probes.Probes) -> DisplacementData:

@@ -178,7 +178,7 @@ def test_a_window_may_be_measured_all_round(tmp_path: Path) -> None:
 
 def test_without_a_force_what_is_not_told_is_said(tmp_path: Path) -> None:
     plate = Plate(**GRIP, data=strip_data(tmp_path))
-    assert "displacements alone tell ratios of moduli, not their size: give force=, or modulus=" in plate.notes
+    assert "displacements alone tell ratios of moduli; their size stays that of the start: give force=" in plate.notes
     assert (plate.start_from_data, plate.scaled(plate.parameters.start, 2.0)) == (False, None)
 
 
