@@ -181,7 +181,8 @@ class Solid(Problem):
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
         data = DisplacementData(self.solid, measured.probes, measured.d, measured.sigma)
         if F is not None:
-            rms = float(np.sqrt(np.mean(np.concatenate([d.ravel() for d in measured.d]) ** 2)))
+            d = np.concatenate([d[at.measured] for at, d in zip(measured.probes, measured.d, strict=True)])
+            rms = float(np.sqrt(np.mean(d**2)))
             direction = self.solid.directions[0]
             force, note = force_data(self.solid, F, direction, apart, o["force_noise"], measured.sigma, rms)
             return replace(data, force=force), (*said, note)
