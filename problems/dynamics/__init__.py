@@ -1,0 +1,1 @@
+"""Motion: schemes of time integration and the matrices of their steps."""

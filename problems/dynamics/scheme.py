@@ -1,0 +1,40 @@
+"""One-step schemes for u' = v, M v' = f - F(u, v), by two weights of the new step.
+
+u_t - u_{t-1} = h (a v_t + (1 - a) v_{t-1}),    M (v_t - v_{t-1}) = h (b (f - F)_t + (1 - b) (f - F)_{t-1})
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+SchemeName = Literal["newmark", "backward-euler", "central-difference"]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Weights of the velocities and of the forces of the new step; explicit where no force of it is used."""
+
+    of_velocity: float
+    of_force: float
+
+    @property
+    def explicit(self) -> bool:
+        return self.of_force == 0.0
+
+    def velocity(self, x: Any) -> Any:
+        """a x_t + (1 - a) x_{t-1} of x_0..x_T along the first axis, (T, ...)."""
+        return self.of_velocity * x[1:] + (1.0 - self.of_velocity) * x[:-1]
+
+    def force(self, x: Any) -> Any:
+        """b x_t + (1 - b) x_{t-1}, likewise."""
+        return self.of_force * x[1:] + (1.0 - self.of_force) * x[:-1]
+
+
+# Newmark 1959 with beta = 1/4, gamma = 1/2, which is the trapezoidal rule; central differences of u (leapfrog) have
+# velocities half a step early
+SCHEMES: dict[SchemeName, Scheme] = {
+    "newmark": Scheme(0.5, 0.5),
+    "backward-euler": Scheme(1.0, 1.0),
+    "central-difference": Scheme(1.0, 0.0),
+}

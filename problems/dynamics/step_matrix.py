@@ -1,0 +1,69 @@
+"""The matrices of a step of M u'' + C u' + K u = f as a system of first order, by its state z = (u, v)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gradient_routes.problems.problem import Array
+
+
+@dataclass(frozen=True)
+class Banded:
+    """A tridiagonal matrix: lower (N - 1,), main (N,) and upper (N - 1,) diagonal."""
+
+    lower: Array
+    main: Array
+    upper: Array
+
+    @property
+    def T(self) -> Banded:
+        return Banded(self.upper, self.main, self.lower)
+
+    def __matmul__(self, v: Array) -> Array:
+        y = np.asarray(self.main * v)
+        y[1:] += self.lower * v[:-1]
+        y[:-1] += self.upper * v[1:]
+        return y
+
+    @property
+    def norm(self) -> float:
+        sums = np.abs(self.main).astype(float)
+        sums[1:] += np.abs(self.lower)
+        sums[:-1] += np.abs(self.upper)
+        return float(sums.max())
+
+
+@dataclass(frozen=True)
+class StepMatrix:
+    """[[a I, b I], [K, D]] of (u, v), each (N,): K the stiffness and D mass and damping, as a step of time weighs them."""
+
+    a: float
+    b: float
+    K: Banded
+    D: Banded
+    transposed: bool = False
+
+    @property
+    def T(self) -> StepMatrix:
+        return StepMatrix(self.a, self.b, self.K, self.D, not self.transposed)
+
+    def __matmul__(self, z: Array) -> Array:
+        N = len(z) // 2
+        u, v = z[:N], z[N:]
+        if self.transposed:
+            return np.concatenate([self.a * u + self.K.T @ v, self.b * u + self.D.T @ v])
+        return np.concatenate([self.a * u + self.b * v, self.K @ u + self.D @ v])
+
+    @cached_property
+    def schur(self) -> Banded:
+        """D - b/a K: what is left for v after u = (r - b v)/a."""
+        by = -self.b / self.a
+        D, K = self.D, self.K
+        return Banded(D.lower + by * K.lower, D.main + by * K.main, D.upper + by * K.upper)
+
+    @property
+    def norm(self) -> float:
+        return max(abs(self.a) + abs(self.b), self.K.norm + self.D.norm)

@@ -1,0 +1,286 @@
+"""The vibrating bar: N two-node elements of the bar with mass, fixed at x = 0, struck at x = L, marched in time.
+
+M u'' + C u' + K(E) u = f(t),    M = rho A L_e diag(1, .., 1, 1/2),    C = c_M M + c_K K + c_G G, G skew
+
+The state of a step is z_t = (u_t, v_t); all steps together are one linear problem R(U, p) = 0, U = (z_1, .., z_T),
+whose R_U is block lower bidiagonal: every route solves it by a march, and its transpose by a march back.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from gradient_routes.problems.bar import THETA_MAX, true_modulus
+from gradient_routes.problems.data.observation import Candidates, Observation
+from gradient_routes.problems.data.regularization import Prior
+from gradient_routes.problems.data.sensors import Nodes, parse_nodes
+from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
+from gradient_routes.problems.dynamics.step_matrix import Banded, StepMatrix
+from gradient_routes.problems.errors import DomainError, InputError, check_applies
+from gradient_routes.problems.matrices.recurrence import Recurrence
+from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Traced
+
+N_MAX, STEPS_MAX, STATE_MAX = 10**5, 10**6, 10**8
+Damping = Literal["none", "rayleigh", "skew"]
+
+
+class VibratingBar(Problem):
+    """A bar struck at its end, whose moduli are sought from histories of displacements: waveform inversion in 1-D.
+
+    State (T 2 N,): displacements [m] and velocities [m/s] of nodes 1..N after every step. Parameters log E or E (N,)
+    of every element, E in Pa. J = 1/2 sum_t |S u_t - d_t|^2 + alpha Phi. Synthetic data are those of the bar's stiff
+    and soft moduli. The rows of R for u are multiplied by m/h, so that all of R is an impulse [N s].
+    """
+
+    name = "vibrating-bar"
+    offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
+    linear = True
+    from_rest = True
+    typical = 0
+    regularization: Prior
+
+    def __init__(
+        self,
+        *,
+        n: Annotated[int, "number of elements N"] = 8,
+        steps: Annotated[int, "of time, T"] = 60,
+        dt: Annotated[float, "length h of a step [s]"] = 0.05,
+        scheme: Annotated[SchemeName, "newmark: the trapezoidal rule; central-difference is explicit"] = "newmark",
+        damping: Annotated[Damping, "rayleigh: C = c_M M + c_K K; skew: of no energy"] = "none",
+        c_m: Annotated[float, "c_M of rayleigh [1/s]"] = 0.1,
+        c_k: Annotated[float, "c_K of rayleigh [s]"] = 0.01,
+        c_g: Annotated[float, "strength of skew damping, times M/s"] = 0.1,
+        sensors: Annotated[Nodes, "5: nodes 1 to 5; 1,3,5 or 2..6: these [every second]"] = "",
+        parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
+        modulus: Annotated[float, "E of the start [Pa]"] = 1.0,
+        density: Annotated[float, "rho [kg/m3]"] = 1.0,
+        length: Annotated[float, "L [m]"] = 1.0,
+        area: Annotated[float, "cross-section A [m2]"] = 1.0,
+        force: Annotated[float, "largest F at the end [N]"] = 1.0,
+        pulse: Annotated[float, "duration of F, a sine squared [s]"] = 0.5,
+        noise: Annotated[float, "standard deviation added to data [m]"] = 0.0,
+        seed: Annotated[int, "of that noise"] = 0,
+        alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
+    ) -> None:
+        check_applies(
+            self.name,
+            ("damping=rayleigh", damping == "rayleigh", True, {"c_m": c_m != 0.1, "c_k": c_k != 0.01}),
+            ("damping=skew", damping == "skew", True, {"c_g": c_g != 0.1}),
+        )
+        if not 1 <= n <= N_MAX or not 1 <= steps <= STEPS_MAX or 2 * n * steps > STATE_MAX:
+            raise InputError(
+                f"vibrating-bar: n={n},steps={steps} - choose 1 <= n <= {N_MAX}, 1 <= steps <= {STEPS_MAX}, and"
+                f" 2 n steps <= {STATE_MAX:g}"
+            )
+        sizes = {"dt": dt, "modulus": modulus, "density": density, "length": length, "area": area, "pulse": pulse}
+        for name, size in sizes.items():
+            if not 0.0 < size < math.inf:
+                raise InputError(f"vibrating-bar: {name}={size:g} - choose a finite {name} > 0")
+        for name, size in {"force": force, "c_m": c_m, "c_k": c_k, "c_g": c_g, "noise": noise}.items():
+            if not math.isfinite(size) or (size < 0.0 and name != "force"):
+                raise InputError(f"vibrating-bar: {name}={size:g} - choose a finite {name} >= 0")
+        if seed < 0:
+            raise InputError(f"vibrating-bar: seed={seed} - choose seed >= 0")
+        self.n, self.steps, self.h, self.scheme = n, steps, dt, SCHEMES[scheme]
+        self.n_state = 2 * n * steps
+        self.L_e, self.A, self.E_0 = length / n, area, modulus
+        self.log, self.noise, self.seed = parametrization == "log", noise, seed
+        self.c_M, self.c_K = (c_m, c_k) if damping == "rayleigh" else (0.0, 0.0)
+        self.mass = np.full(n, density * area * self.L_e)  # (N,) [kg]
+        self.mass[-1] /= 2.0
+        self.row = self.mass[0] / dt
+        self.skew = np.full(n - 1, c_g * self.mass[0] if damping == "skew" else 0.0)  # above the diagonal [kg/s]
+        t = np.arange(steps + 1) * dt
+        self.load = np.zeros((steps + 1, n))  # [N]
+        self.load[:, -1] = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)
+        self.nodes = parse_nodes(sensors or list(range(n, 0, -2))[::-1], n, self.name)
+        self.d: Array | None = None  # (T, m) [m]
+        self.x = (np.arange(n) + 0.5) * self.L_e
+        self.regularization = Prior(alpha)
+        self.regularization.check(self.name)
+        self.parameters = Parameters(
+            start=np.full(n, math.log(modulus) if self.log else modulus),
+            scale=np.full(n, 1.0 if self.log else modulus),
+            lower=-THETA_MAX if self.log else 0.0,
+            upper=THETA_MAX if self.log else math.exp(THETA_MAX),
+            unit="log Pa" if self.log else "Pa",
+            label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
+            position=self.x[:, None],
+        )
+        self._check_stable(self.stiffness(self.parameters.start))
+
+    # --- the equations
+
+    def stiffness(self, p: Any, xp: Any = np) -> Any:
+        """Spring constants D = E A / L_e, (N,) [N/m]."""
+        return (xp.exp(p) if self.log else p) * (self.A / self.L_e)
+
+    def history(self, u: Any, xp: Any = np) -> tuple[Any, Any]:
+        """Displacements and velocities, (T + 1, N) each, those of rest included."""
+        z = xp.reshape(u, (self.steps, 2, self.n))
+        rest = xp.zeros((1, self.n), dtype=z.dtype)
+        return xp.concatenate([rest, z[:, 0]]), xp.concatenate([rest, z[:, 1]])
+
+    def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
+        """R (T 2 N,) [N s]: what is left of the two rows of every step, see `Scheme`."""
+        x, v = self.history(u, xp)
+        forces = _spread(self.stiffness(p, xp) * _elongation(x + self.c_K * v, xp), xp)
+        forces = forces + self.c_M * self.mass * v + self._gyroscopic(v, xp) - xp.asarray(self.load)
+        moved = self.row * (x[1:] - x[:-1] - self.h * self.scheme.velocity(v))
+        driven = self.mass * (v[1:] - v[:-1]) + self.h * self.scheme.force(forces)
+        return xp.reshape(xp.stack([moved, driven], axis=1), (self.n_state,))
+
+    def _gyroscopic(self, v: Any, xp: Any) -> Any:
+        """c_G G v, (T + 1, N)."""
+        end = xp.zeros_like(v[:, :1])
+        return xp.concatenate([self.skew * v[:, 1:], end], axis=1) - xp.concatenate(
+            [end, self.skew * v[:, :-1]], axis=1
+        )
+
+    def tangent(self, u: Array, p: Array) -> Recurrence:
+        """Raises DomainError where an explicit step is too long for p."""
+        k = self.stiffness(p)
+        self._check_stable(k)
+        scheme = self.scheme
+        new = self._step_matrix(k, 1.0, scheme.of_velocity, scheme.of_force)
+        old = self._step_matrix(k, -1.0, 1.0 - scheme.of_velocity, 1.0 - scheme.of_force)
+        return Recurrence((new,), (old,), self.steps)
+
+    def _step_matrix(self, k: Array, sign: float, of_velocity: float, of_force: float) -> StepMatrix:
+        h, w = self.h, self.h * of_force
+        K = Banded(-w * k[1:], w * np.append(k[:-1] + k[1:], k[-1]), -w * k[1:])
+        D = Banded(
+            self.c_K * K.lower - w * self.skew,
+            self.c_K * K.main + (sign + w * self.c_M) * self.mass,
+            self.c_K * K.upper + w * self.skew,
+        )
+        return StepMatrix(sign * self.row, -self.row * h * of_velocity, K, D)
+
+    def _check_stable(self, k: Array) -> None:
+        """h <= 2 / omega_max for an explicit scheme, omega_max^2 bounded by the largest row sum of M^{-1} K."""
+        if not self.scheme.explicit:
+            return
+        rows = (np.append(k[:-1] + k[1:], k[-1]) + np.append(0.0, k[1:]) + np.append(k[1:], 0.0)).real
+        most = 2.0 / math.sqrt(float((rows / self.mass).max()))
+        if self.h > most:
+            raise DomainError(
+                f"vibrating-bar: dt={self.h:g} is beyond {most:.3g}, up to which central differences are stable at this"
+                " p - choose a smaller dt or another scheme"
+            )
+
+    def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
+        """J = 1/2 sum_t |S u_t - d_t|^2 + alpha Phi [m2]."""
+        J = 0.5 * xp.sum((self._read(u, xp) - self._data()) ** 2)
+        return J + self.regularization.value(xp, p if self.log else xp.log(p)) if self.alpha else J
+
+    def linearize(self, u: Array, p: Array) -> Linearization:
+        x, v = self.history(u)
+        of_dD = self.h * self.scheme.force(_elongation(x + self.c_K * v, np))
+        dD_dp = self.stiffness(p) if self.log else np.full_like(p, self.A / self.L_e)
+        J_u = np.zeros((self.steps, 2, self.n), dtype=u.dtype)
+        J_u[:, 0, self.nodes - 1] = self._read(u) - self._data()
+        J_p = np.zeros_like(p)
+        if self.alpha:
+            J_p = self.regularization.gradient(p if self.log else np.log(p)) * (1.0 if self.log else 1.0 / p)
+        return Linearization(ImpulsesByStiffness(of_dD * dD_dp), J_u.ravel(), J_p)
+
+    def traced(self) -> Traced:
+        from gradient_routes.problems.jax64 import jnp
+
+        return Traced(lambda u, p: self.residual(u, p, jnp), lambda u, p: self.objective(u, p, jnp))
+
+    # --- data
+
+    def _read(self, u: Any, xp: Any = np) -> Any:
+        """Displacements at the sensors, (T, m) [m]."""
+        return xp.reshape(u, (self.steps, 2, self.n))[:, 0, self.nodes - 1]
+
+    def observation(self, u: Array, p: Array) -> Observation:
+        from scipy import sparse
+
+        at = (2 * np.arange(self.steps)[:, None] * self.n + self.nodes - 1).ravel()
+        S = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), self.n_state))
+        m, d = len(self.nodes), self._data()
+        label = lambda k: f"u_{self.nodes[k % m]} at {(k // m + 1) * self.h:.3g} s"  # noqa: E731
+        return Observation(self._read(u).ravel(), d.ravel(), S, sigma=self.noise, label=label)
+
+    def candidates(self) -> Candidates:
+        """The displacements of every node in every step."""
+        t, i = np.divmod(np.arange(self.steps * self.n), self.n)
+        label = lambda k: f"u_{i[k] + 1} at {(t[k] + 1) * self.h:.3g} s"  # noqa: E731
+        return Candidates(2 * t * self.n + i, label, ((i + 1) * self.L_e)[:, None])
+
+    def prior(self, p: Array) -> tuple[Prior, Array, Array]:
+        return self.regularization, p if self.log else np.log(p), np.ones_like(p) if self.log else 1.0 / p
+
+    def _data(self) -> Array:
+        if self.d is None:
+            raise InputError(
+                "vibrating-bar: synthetic data are not made yet - solve for them:"
+                " gradient_routes.routes.synthetic_data.with_synthetic_data(bar)"
+            )
+        return self.d
+
+    def truth(self) -> Array:
+        E = self.E_0 * true_modulus(self.x / (self.n * self.L_e))
+        return np.asarray(np.log(E) if self.log else E)
+
+    def twin(self) -> VibratingBar | None:
+        return self._with_data(np.zeros((self.steps, len(self.nodes)))) if self.d is None else None
+
+    def observed(self, u: Array, seed: int | None = None) -> VibratingBar:
+        rng = np.random.default_rng(self.seed if seed is None else seed)
+        d = self._read(u)
+        return self._with_data(d + self.noise * rng.standard_normal(d.shape))
+
+    def _with_data(self, d: Array) -> VibratingBar:
+        other = copy.copy(self)
+        other.d = d
+        return other
+
+    def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
+        return ParameterView({"x": self.x, "E": self.stiffness(p) * self.L_e / self.A})
+
+
+class ImpulsesByStiffness:
+    """R_p of all steps, (T 2 N, N): column e the impulses [N s] that element e, stretched by w (T, N), adds to nodes."""
+
+    def __init__(self, w: Array) -> None:
+        self.w = w
+
+    @property
+    def T(self) -> StiffnessByImpulses:
+        return StiffnessByImpulses(self.w)
+
+    def __matmul__(self, dp: Array) -> Array:
+        driven = _spread(self.w * dp, np)
+        return np.stack([np.zeros_like(driven), driven], axis=1).ravel()
+
+
+class StiffnessByImpulses:
+    """R_p^T of all steps, (N, T 2 N)."""
+
+    def __init__(self, w: Array) -> None:
+        self.w = w
+
+    @property
+    def T(self) -> ImpulsesByStiffness:
+        return ImpulsesByStiffness(self.w)
+
+    def __matmul__(self, lam: Array) -> Array:
+        driven = lam.reshape(len(self.w), 2, -1)[:, 1]
+        return np.asarray((self.w * _elongation(driven, np)).sum(axis=0))
+
+
+def _elongation(x: Any, xp: Any) -> Any:
+    """B x of every row, (.., N)."""
+    return xp.concatenate([x[:, :1], x[:, 1:] - x[:, :-1]], axis=1)
+
+
+def _spread(q: Any, xp: Any) -> Any:
+    """B^T q of every row, (.., N)."""
+    return xp.concatenate([q[:, :-1] - q[:, 1:], q[:, -1:]], axis=1)
