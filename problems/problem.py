@@ -226,6 +226,7 @@ class Problem:
                Rheinboldt 1970, 13.3.4) or by an active-set method: halving steps would hinder it
     affine     u is an affine function of p: R is affine in u and p is a load
     affine_at_rest  it is where u is small: p is a load, and u = 0 without it
+    steps      in time; 0: a steady problem
     regularization  the prior, whose weight is alpha; None where there can be none
     stop       of a state that meets an obstacle: the contact law, None where there is none
     typical    the component of p, counted from 0, that a study of single components shows unless told others; None:
@@ -250,6 +251,7 @@ class Problem:
     line_search: bool = True
     affine: bool = False
     affine_at_rest: bool = False
+    steps: int = 0
     regularization: Prior | None = None
     stop: Stop | None = None
     typical: int | None = None

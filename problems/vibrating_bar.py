@@ -18,17 +18,19 @@ from gradient_routes.problems.bar import THETA_MAX, true_modulus
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
+from gradient_routes.problems.dynamics.bar_step import BarStep
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
 from gradient_routes.problems.dynamics.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.errors import DomainError, InputError, check_applies
 from gradient_routes.problems.matrices.recurrence import Recurrence
-from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Problem, Traced
+from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Traced
+from gradient_routes.problems.transient import Transient
 
 N_MAX, STEPS_MAX, STATE_MAX = 10**5, 10**6, 10**8
 Damping = Literal["none", "rayleigh", "skew"]
 
 
-class VibratingBar(Problem):
+class VibratingBar(Transient):
     """A bar struck at its end, whose moduli are sought from histories of displacements: waveform inversion in 1-D.
 
     State (T 2 N,): displacements [m] and velocities [m/s] of nodes 1..N after every step. Parameters log E or E (N,)
@@ -38,7 +40,7 @@ class VibratingBar(Problem):
 
     name = "vibrating-bar"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
-    linear = True
+    linear = constant = True
     from_rest = True
     typical = 0
     regularization: Prior
@@ -99,6 +101,7 @@ class VibratingBar(Problem):
         self.load[:, -1] = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)
         self.nodes = parse_nodes(sensors or list(range(n, 0, -2))[::-1], n, self.name)
         self.d: Array | None = None  # (T, m) [m]
+        self._kept: tuple[Array, tuple[StepMatrix, StepMatrix]] | None = None
         self.x = (np.arange(n) + 0.5) * self.L_e
         self.regularization = Prior(alpha)
         self.regularization.check(self.name)
@@ -127,38 +130,55 @@ class VibratingBar(Problem):
 
     def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
         """R (T 2 N,) [N s]: what is left of the two rows of every step, see `Scheme`."""
-        x, v = self.history(u, xp)
-        forces = _spread(self.stiffness(p, xp) * _elongation(x + self.c_K * v, xp), xp)
-        forces = forces + self.c_M * self.mass * v + self._gyroscopic(v, xp) - xp.asarray(self.load)
-        moved = self.row * (x[1:] - x[:-1] - self.h * self.scheme.velocity(v))
-        driven = self.mass * (v[1:] - v[:-1]) + self.h * self.scheme.force(forces)
-        return xp.reshape(xp.stack([moved, driven], axis=1), (self.n_state,))
+        return xp.reshape(self.rows(*self.history(u, xp), p, xp.asarray(self.load), xp), (self.n_state,))
+
+    def rows(self, x: Any, v: Any, p: Any, load: Any, xp: Any = np) -> Any:
+        """R (m, 2, N) of m steps from displacements, velocities and loads (m + 1, N) before and after them."""
+        h, scheme, k = self.h, self.scheme, self.stiffness(p, xp)
+        moved = self.row * (x[1:] - x[:-1] - h * scheme.velocity(v))
+        driven = self.mass * (v[1:] - v[:-1]) + h * scheme.force(_spread(k * _elongation(x, xp), xp) - load)
+        if self.c_K:
+            driven = driven + h * self.c_K * scheme.damping(_spread(k * _elongation(v, xp), xp))
+        if self.c_M:
+            driven = driven + h * self.c_M * self.mass * scheme.damping(v)
+        if self.skew.any():
+            driven = driven + h * scheme.damping(self._gyroscopic(v, xp))
+        return xp.stack([moved, driven], axis=1)
 
     def _gyroscopic(self, v: Any, xp: Any) -> Any:
-        """c_G G v, (T + 1, N)."""
+        """c_G G v, (m, N)."""
         end = xp.zeros_like(v[:, :1])
-        return xp.concatenate([self.skew * v[:, 1:], end], axis=1) - xp.concatenate(
-            [end, self.skew * v[:, :-1]], axis=1
-        )
+        ahead, behind = self.skew * v[:, 1:], self.skew * v[:, :-1]
+        return xp.concatenate([ahead, end], axis=1) - xp.concatenate([end, behind], axis=1)
 
     def tangent(self, u: Array, p: Array) -> Recurrence:
         """Raises DomainError where an explicit step is too long for p."""
-        k = self.stiffness(p)
-        self._check_stable(k)
-        scheme = self.scheme
-        new = self._step_matrix(k, 1.0, scheme.of_velocity, scheme.of_force)
-        old = self._step_matrix(k, -1.0, 1.0 - scheme.of_velocity, 1.0 - scheme.of_force)
-        return Recurrence((new,), (old,), self.steps)
+        A, B = self.step_matrices(p)
+        return Recurrence((A,), (B,), self.steps)
 
-    def _step_matrix(self, k: Array, sign: float, of_velocity: float, of_force: float) -> StepMatrix:
-        h, w = self.h, self.h * of_force
-        K = Banded(-w * k[1:], w * np.append(k[:-1] + k[1:], k[-1]), -w * k[1:])
+    def step_matrices(self, p: Array) -> tuple[StepMatrix, StepMatrix]:
+        """A and B of A z_t + B z_{t-1}, the same for all steps. Raises DomainError, see `tangent`."""
+        if self._kept is None or not np.array_equal(self._kept[0], p):
+            k, s = self.stiffness(p), self.scheme
+            self._check_stable(k)
+            new = self._step_matrix(k, 1.0, s.of_velocity, s.of_force, s.of_damping)
+            old = self._step_matrix(k, -1.0, 1.0 - s.of_velocity, 1.0 - s.of_force, 1.0 - s.of_damping)
+            self._kept = p.copy(), (new, old)
+        return self._kept[1]
+
+    def _step_matrix(self, k: Array, sign: float, of_velocity: float, of_force: float, of_damping: float) -> StepMatrix:
+        main, h, c = np.append(k[:-1] + k[1:], k[-1]), self.h, self.h * of_damping
+        w = h * of_force
+        K = Banded(-w * k[1:], w * main, -w * k[1:])
         D = Banded(
-            self.c_K * K.lower - w * self.skew,
-            self.c_K * K.main + (sign + w * self.c_M) * self.mass,
-            self.c_K * K.upper + w * self.skew,
+            -c * (self.c_K * k[1:] + self.skew),
+            c * self.c_K * main + (sign + c * self.c_M) * self.mass,
+            -c * (self.c_K * k[1:] - self.skew),
         )
         return StepMatrix(sign * self.row, -self.row * h * of_velocity, K, D)
+
+    def at(self, t: int) -> BarStep:
+        return BarStep(self, t)
 
     def _check_stable(self, k: Array) -> None:
         """h <= 2 / omega_max for an explicit scheme, omega_max^2 bounded by the largest row sum of M^{-1} K."""
@@ -174,19 +194,30 @@ class VibratingBar(Problem):
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 sum_t |S u_t - d_t|^2 + alpha Phi [m2]."""
-        J = 0.5 * xp.sum((self._read(u, xp) - self._data()) ** 2)
-        return J + self.regularization.value(xp, p if self.log else xp.log(p)) if self.alpha else J
+        J = 0.5 * xp.sum((self._read(u, xp) - self.data()) ** 2)
+        return J + self.regularization.value(xp, self.log_modulus(p, xp)) if self.alpha else J
 
     def linearize(self, u: Array, p: Array) -> Linearization:
-        x, v = self.history(u)
-        of_dD = self.h * self.scheme.force(_elongation(x + self.c_K * v, np))
-        dD_dp = self.stiffness(p) if self.log else np.full_like(p, self.A / self.L_e)
         J_u = np.zeros((self.steps, 2, self.n), dtype=u.dtype)
-        J_u[:, 0, self.nodes - 1] = self._read(u) - self._data()
-        J_p = np.zeros_like(p)
-        if self.alpha:
-            J_p = self.regularization.gradient(p if self.log else np.log(p)) * (1.0 if self.log else 1.0 / p)
-        return Linearization(ImpulsesByStiffness(of_dD * dD_dp), J_u.ravel(), J_p)
+        J_u[:, 0, self.nodes - 1] = self._read(u) - self.data()
+        return Linearization(self.by_modulus(*self.history(u), p), J_u.ravel(), self.by_prior(p))
+
+    def by_modulus(self, x: Array, v: Array, p: Array) -> ImpulsesByStiffness:
+        """R_p of m steps, from displacements and velocities (m + 1, N) before and after them."""
+        w = self.h * self.scheme.force(_elongation(x, np))
+        if self.c_K:
+            w += self.h * self.c_K * self.scheme.damping(_elongation(v, np))
+        return ImpulsesByStiffness(w * (self.stiffness(p) if self.log else self.A / self.L_e))
+
+    def by_prior(self, p: Array) -> Array:
+        """J_p, (N,)."""
+        if not self.alpha:
+            return np.zeros_like(p)
+        by_theta = self.regularization.gradient(self.log_modulus(p))
+        return by_theta if self.log else by_theta / p
+
+    def log_modulus(self, p: Any, xp: Any = np) -> Any:
+        return p if self.log else xp.log(p)
 
     def traced(self) -> Traced:
         from gradient_routes.problems.jax64 import jnp
@@ -204,7 +235,7 @@ class VibratingBar(Problem):
 
         at = (2 * np.arange(self.steps)[:, None] * self.n + self.nodes - 1).ravel()
         S = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), self.n_state))
-        m, d = len(self.nodes), self._data()
+        m, d = len(self.nodes), self.data()
         label = lambda k: f"u_{self.nodes[k % m]} at {(k // m + 1) * self.h:.3g} s"  # noqa: E731
         return Observation(self._read(u).ravel(), d.ravel(), S, sigma=self.noise, label=label)
 
@@ -215,9 +246,10 @@ class VibratingBar(Problem):
         return Candidates(2 * t * self.n + i, label, ((i + 1) * self.L_e)[:, None])
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
-        return self.regularization, p if self.log else np.log(p), np.ones_like(p) if self.log else 1.0 / p
+        return self.regularization, self.log_modulus(p), np.ones_like(p) if self.log else 1.0 / p
 
-    def _data(self) -> Array:
+    def data(self) -> Array:
+        """d (T, m) [m]. Raises InputError where synthetic data are not made yet."""
         if self.d is None:
             raise InputError(
                 "vibrating-bar: synthetic data are not made yet - solve for them:"
@@ -247,7 +279,7 @@ class VibratingBar(Problem):
 
 
 class ImpulsesByStiffness:
-    """R_p of all steps, (T 2 N, N): column e the impulses [N s] that element e, stretched by w (T, N), adds to nodes."""
+    """R_p of all steps, (T 2 N, N): column e the impulses [N s] of element e, stretched by w (T, N)."""
 
     def __init__(self, w: Array) -> None:
         self.w = w

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from gradient_routes.problems.problem import Array
+from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.problems.transient import Transient
+from gradient_routes.routes.backward_march import march_back
+from gradient_routes.routes.checkpointing import Schedule
 from gradient_routes.routes.corrected import corrected, correction
 from gradient_routes.routes.linearized_solve import Factors, LinearizedSolver, work
 from gradient_routes.routes.model import Model
@@ -14,14 +18,46 @@ from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, rout
 Correct = Annotated[Literal["no", "yes"], "one Newton step and one adjoint correction more: errors of second order"]
 
 
-def cost(n_p: int, forward: ForwardWork, *, factors: str, correct: str = "no") -> Work:
+Checkpoint = Annotated[
+    str | None, "states that a march in time keeps: all, none, sqrt, every=K, revolve=S [all steps as one system]"
+]
+
+
+def cost(n_p: int, forward: ForwardWork, *, factors: str, correct: str = "no", checkpoint: str | None = None) -> Work:
     once = work(forward, 1, transposed=True, factors=factors)
+    if checkpoint is not None:
+        steps = forward.cold.steps
+        return once + Work(residuals=1, steps=Schedule.of(checkpoint, steps, "adjoint").recomputed(steps))
     return once if correct == "no" else once + correction(forward, factors)
 
 
-@route("adjoint", needs=Offers.LINEARIZE, cost=cost)
-def adjoint(model: Model, p: Array, *, factors: Factors = "refined", correct: Correct = "no") -> Result:
+def check(*, factors: str, correct: str, checkpoint: str | None) -> None:
+    if checkpoint is not None and (factors, correct) != ("refined", "no"):
+        raise InputError(f"adjoint: checkpoint={checkpoint} takes neither factors={factors} nor correct={correct}")
+
+
+def missing(problem: Problem, *, factors: str, correct: str, checkpoint: str | None) -> str | None:
+    if checkpoint is None:
+        return None
+    if not isinstance(problem, Transient):
+        return f"adjoint[checkpoint={checkpoint}] marches back in time, {problem.name} has no steps"
+    Schedule.of(checkpoint, problem.steps, f"adjoint on {problem.name}")
+    return None if problem.constant else f"adjoint[checkpoint={checkpoint}] needs steps of one matrix"
+
+
+@route("adjoint", needs=Offers.LINEARIZE, cost=cost, check=check, missing=missing)
+def adjoint(
+    model: Model,
+    p: Array,
+    *,
+    factors: Factors = "refined",
+    correct: Correct = "no",
+    checkpoint: Checkpoint = None,
+) -> Result:
     """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p."""
+    if checkpoint is not None:
+        assert isinstance(model.problem, Transient)  # see `missing`
+        return march_back(model, p, Schedule.of(checkpoint, model.problem.steps, "adjoint"))
     state = model.solve(p)
     lin = model.linearize(state)
     R_u = LinearizedSolver(model, state, factors)

@@ -140,6 +140,7 @@ class Model:
         polish = 0 if self.problem.linear else max(polish, self.solver.polish)
         before = self.tally.work
         self.tally.count("forward_solves")
+        self.tally.count("steps", self.problem.steps)
         u = self.initial(p) if start is None else start.u.astype(p.dtype)
         scale = None if start is None else start.scale
         try:

@@ -19,6 +19,7 @@ class Work:
                        for the first transposed substitution with a matrix that is not symmetric
     solves             substitutions with factors of R_u, one per right-hand side
     transposed_solves  substitutions with factors of R_u^T, one per right-hand side
+    steps              forward in time, of transient problems, repeated ones included
     """
 
     forward_solves: int = 0
@@ -29,6 +30,7 @@ class Work:
     factorizations: int = 0
     solves: int = 0
     transposed_solves: int = 0
+    steps: int = 0
 
     def __add__(self, other: Work) -> Work:
         return Work(*map(operator.add, vars(self).values(), vars(other).values()))

@@ -94,5 +94,6 @@ def _object(text: str) -> Any:
 
 
 @lru_cache(maxsize=1 << 14)
-def _work(counts: tuple[int | None, ...]) -> dict[str, int | None] | None:
-    return None if None in counts else dict(zip(KINDS, counts, strict=True))
+def _work(counts: tuple[int | None, ...]) -> dict[str, int] | None:
+    """Kinds of work that are newer than a row were counted 0 times."""
+    return None if counts[0] is None else {kind: count or 0 for kind, count in zip(KINDS, counts, strict=True)}

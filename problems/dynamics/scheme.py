@@ -1,6 +1,7 @@
-"""One-step schemes for u' = v, M v' = f - F(u, v), by two weights of the new step.
+"""One-step schemes for u' = v, M v' = f - K u - C v, by the weights of the new step.
 
-u_t - u_{t-1} = h (a v_t + (1 - a) v_{t-1}),    M (v_t - v_{t-1}) = h (b (f - F)_t + (1 - b) (f - F)_{t-1})
+u_t - u_{t-1} = h (a v_t + (1 - a) v_{t-1})
+M (v_t - v_{t-1}) = h (b (f - K u)_t + (1 - b) (f - K u)_{t-1} - c (C v)_t - (1 - c) (C v)_{t-1})
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ SchemeName = Literal["newmark", "backward-euler", "central-difference"]
 
 @dataclass(frozen=True)
 class Scheme:
-    """Weights of the velocities and of the forces of the new step; explicit where no force of it is used."""
+    """Weights a, b, c of velocities, forces and damping of the new step; explicit where none of its forces is used."""
 
     of_velocity: float
     of_force: float
+    of_damping: float
 
     @property
     def explicit(self) -> bool:
@@ -30,11 +32,15 @@ class Scheme:
         """b x_t + (1 - b) x_{t-1}, likewise."""
         return self.of_force * x[1:] + (1.0 - self.of_force) * x[:-1]
 
+    def damping(self, x: Any) -> Any:
+        """c x_t + (1 - c) x_{t-1}, likewise."""
+        return self.of_damping * x[1:] + (1.0 - self.of_damping) * x[:-1]
+
 
 # Newmark 1959 with beta = 1/4, gamma = 1/2, which is the trapezoidal rule; central differences of u (leapfrog) have
 # velocities half a step early
 SCHEMES: dict[SchemeName, Scheme] = {
-    "newmark": Scheme(0.5, 0.5),
-    "backward-euler": Scheme(1.0, 1.0),
-    "central-difference": Scheme(1.0, 0.0),
+    "newmark": Scheme(0.5, 0.5, 0.5),
+    "backward-euler": Scheme(1.0, 1.0, 1.0),
+    "central-difference": Scheme(1.0, 0.0, 1.0),
 }

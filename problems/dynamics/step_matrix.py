@@ -38,7 +38,7 @@ class Banded:
 
 @dataclass(frozen=True)
 class StepMatrix:
-    """[[a I, b I], [K, D]] of (u, v), each (N,): K the stiffness and D mass and damping, as a step of time weighs them."""
+    """[[a I, b I], [K, D]] of (u, v), each (N,): K the stiffness, D mass and damping, as a step weighs them."""
 
     a: float
     b: float

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.dynamics.step_matrix import StepMatrix
+from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.sparse import BlockDiagonal
 from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
-from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.recurrence import RecurrenceFactorization, StepFactorization
+from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.solvers.superlu import SparseFactorization
 from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, TridiagonalFactorization

@@ -1,0 +1,146 @@
+"""The vibrating bar: its motion against an integrator that is not ours, its steps, its gradients by every route."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import ROUTES, relative_error
+from scipy.integrate import solve_ivp
+
+from gradient_routes.problems.errors import DomainError, InputError
+from gradient_routes.problems.vibrating_bar import VibratingBar
+from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.complex_step import complex_step
+from gradient_routes.routes.model import Model
+from gradient_routes.routes.synthetic_data import with_synthetic_data
+
+SCHEMES = ("newmark", "backward-euler", "central-difference")
+DAMPINGS: dict[str, dict[str, Any]] = {
+    "none": {},
+    "rayleigh": {"damping": "rayleigh", "c_m": 0.3, "c_k": 0.02},
+    "skew": {"damping": "skew", "c_g": 2.0},
+}
+
+
+def made(**options: Any) -> VibratingBar:
+    return with_synthetic_data(VibratingBar(**{"n": 4, "steps": 12, "dt": 0.1} | options))
+
+
+def solved(bar: VibratingBar) -> tuple[Any, Any]:
+    """Displacements and velocities (T, N)."""
+    u = Model(bar).solve(bar.parameters.start).u.reshape(bar.steps, 2, bar.n)
+    return u[:, 0], u[:, 1]
+
+
+@pytest.mark.parametrize("damping", DAMPINGS)
+@pytest.mark.parametrize(("scheme", "order"), [*zip(SCHEMES, (2.0, 1.0, 2.0), strict=True)])
+def test_the_motion_converges_to_that_of_a_fine_integrator(scheme: str, order: float, damping: str) -> None:
+    """SciPy's DOP853 on M u'' + C u' + K u = f(t), whose matrices are written out here. Damping by the new velocity
+    makes central differences first-order accurate."""
+    n, end, off = 3, 1.2, []
+    bar = made(n=n, steps=30, dt=end / 30, **DAMPINGS[damping])
+    k, m = np.full(n, float(n)), np.array([1.0, 1.0, 0.5]) / n
+    B = np.eye(n) - np.eye(n, k=-1)
+    K, G = B.T @ np.diag(k) @ B, np.eye(n, k=1) - np.eye(n, k=-1)
+    C = bar.c_M * np.diag(m) + bar.c_K * K + (2.0 * m[0] * G if damping == "skew" else 0.0)
+
+    def rate(t: float, z: Any) -> Any:
+        f = np.zeros(n)
+        f[-1] = np.sin(np.pi * t / 0.5) ** 2 if t < 0.5 else 0.0
+        return np.concatenate([z[n:], (f - K @ z[:n] - C @ z[n:]) / m])
+
+    exact = solve_ivp(rate, (0.0, end), np.zeros(2 * n), "DOP853", rtol=1e-10, atol=1e-12, max_step=0.02).y[:n, -1]
+    for steps in (120, 240, 480):
+        u, _ = solved(made(n=n, steps=steps, dt=end / steps, scheme=scheme, **DAMPINGS[damping]))
+        off.append(np.abs(u[-1] - exact).max())
+    if scheme == "central-difference" and damping != "none":
+        order = 1.0
+    assert np.log2(off[1] / off[2]) == pytest.approx(order, abs=0.2)
+    assert off[2] < (1e-4 if order == 2.0 else 2e-2)
+
+
+@pytest.mark.parametrize("damping", ["none", "skew"])
+def test_the_trapezoidal_rule_keeps_the_energy_of_a_free_bar(damping: str) -> None:
+    """After the pulse, also with damping that does no work."""
+    bar = made(steps=60, **DAMPINGS[damping])
+    u, v = solved(bar)
+    k = bar.stiffness(bar.parameters.start)
+    stretch = np.diff(u, axis=1, prepend=0.0)
+    energy = 0.5 * (k * stretch**2).sum(axis=1) + 0.5 * (bar.mass * v**2).sum(axis=1)
+    free = energy[6:]
+    assert np.ptp(free) < 1e-13 * free[0]
+    assert free[0] > 0.01
+
+
+@pytest.mark.parametrize("damping", DAMPINGS)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_every_route_gives_the_gradient_of_complex_steps(scheme: str, damping: str) -> None:
+    bar = made(scheme=scheme, alpha=0.1, parametrization="raw", **DAMPINGS[damping])
+    model, p = Model(bar), 1.0 + 0.2 * np.sin(np.arange(4.0))
+    exact = complex_step.prepare(model, p)(p).gradient
+    for route in ROUTES:
+        found = route.prepare(model, p)(p)
+        assert relative_error(found.gradient, exact) < (route.accuracy or 1e-12), route.name
+
+
+def test_a_step_is_a_problem_whose_rows_are_those_of_the_march() -> None:
+    bar = made(damping="rayleigh", alpha=0.2)
+    rng, p = np.random.default_rng(0), bar.parameters.start
+    U = rng.standard_normal(bar.n_state)
+    z = np.concatenate([[np.zeros(8)], U.reshape(bar.steps, -1)])
+    rows = bar.residual(U, p).reshape(bar.steps, -1)
+    J = sum(bar.at(t).objective(z[t], np.concatenate([z[t - 1], p])) for t in range(1, 13))
+    assert bar.objective(U, p) == pytest.approx(J, rel=1e-14)
+    for t in (1, 5, 12):
+        step, q = bar.at(t), np.concatenate([z[t - 1], p])
+        np.testing.assert_allclose(step.residual(z[t], q), rows[t - 1], atol=1e-14)
+        lin, dq, dz = step.linearize(z[t], q), rng.standard_normal(len(q)), rng.standard_normal(8)
+        by_q = step.residual(z[t].astype(complex), q + 1e-30j * dq).imag / 1e-30
+        np.testing.assert_allclose(lin.R_p @ dq, by_q, atol=1e-13)
+        assert dz @ (lin.R_p @ dq) == pytest.approx((lin.R_p.T @ dz) @ dq, rel=1e-12)
+        np.testing.assert_allclose(step.tangent(z[t], q) @ dz, step.residual(z[t] + dz, q) - rows[t - 1], atol=1e-13)
+
+
+@pytest.mark.parametrize("checkpoint", ["all", "none", "sqrt", "every=5", "revolve=2", "revolve=12"])
+def test_checkpoints_change_memory_and_steps_not_the_gradient(checkpoint: str) -> None:
+    """Bitwise: the same operations on the same states."""
+    bar = made(scheme="newmark", damping="skew", alpha=0.1)
+    p = bar.parameters.start + 0.1
+    kept = adjoint.prepare(Model(bar), p, checkpoint="all")(p)
+    model = Model(bar)
+    found = adjoint.prepare(model, p, checkpoint=checkpoint)(p)
+    assert np.array_equal(found.gradient, kept.gradient)
+    assert found.J == kept.J
+    whole = adjoint.prepare(Model(bar), p)(p)
+    assert relative_error(found.gradient, whole.gradient) < 1e-13
+    assert found.J == pytest.approx(whole.J, rel=1e-13)
+    again = {"all": 0, "none": 55, "sqrt": 6, "every=5": 8, "revolve=2": 17, "revolve=12": 0}
+    assert model.tally.work.steps == 12 + again[checkpoint]
+
+
+def test_an_explicit_step_beyond_its_limit_is_refused() -> None:
+    """2 / omega_max of the chain, bounded by the largest row: 2 sqrt(m / 4 k), 0.125 s."""
+    with pytest.raises(DomainError, match=r"dt=0.2 is beyond 0.125, up to which central differences are stable"):
+        VibratingBar(n=4, steps=12, dt=0.2, scheme="central-difference")
+    bar = made(scheme="central-difference")
+    with pytest.raises(DomainError, match=r"choose a smaller dt"):
+        Model(bar).solve(bar.parameters.start + 3.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"steps": 0}, "steps=0 - choose"),
+        ({"dt": -0.1}, "dt=-0.1 - choose a finite dt > 0"),
+        ({"dt": float("nan")}, "dt=nan"),
+        ({"n": 10**5, "steps": 10**6}, "2 n steps <= 1e\\+08"),
+        ({"c_m": 0.2}, "c_m"),
+        ({"sensors": "9"}, "there are 4"),
+        ({"noise": -1.0}, "noise=-1"),
+    ],
+)
+def test_bad_options_are_told(options: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        VibratingBar(**{"n": 4, "steps": 12} | options)
