@@ -18,26 +18,31 @@ from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, rout
 Correct = Annotated[Literal["no", "yes"], "one Newton step and one adjoint correction more: errors of second order"]
 
 
+WHOLE = "whole"
+MOST = 10**9  # steps, of any problem
 Checkpoint = Annotated[
-    str | None, "states that a march in time keeps: all, none, sqrt, every=K, revolve=S [all steps as one system]"
+    str, "states that a march in time keeps: all, none, sqrt, every=K, revolve=S; whole: all steps as one system"
 ]
 
 
-def cost(n_p: int, forward: ForwardWork, *, factors: str, correct: str = "no", checkpoint: str | None = None) -> Work:
+def cost(n_p: int, forward: ForwardWork, *, factors: str, correct: str = "no", checkpoint: str = WHOLE) -> Work:
     once = work(forward, 1, transposed=True, factors=factors)
-    if checkpoint is not None:
+    if checkpoint != WHOLE:
         steps = forward.cold.steps
         return once + Work(residuals=1, steps=Schedule.of(checkpoint, steps, "adjoint").recomputed(steps))
     return once if correct == "no" else once + correction(forward, factors)
 
 
-def check(*, factors: str, correct: str, checkpoint: str | None) -> None:
-    if checkpoint is not None and (factors, correct) != ("refined", "no"):
+def check(*, factors: str, correct: str, checkpoint: str) -> None:
+    if checkpoint == WHOLE:
+        return
+    Schedule.of(checkpoint, MOST, "adjoint")
+    if (factors, correct) != ("refined", "no"):
         raise InputError(f"adjoint: checkpoint={checkpoint} takes neither factors={factors} nor correct={correct}")
 
 
-def missing(problem: Problem, *, factors: str, correct: str, checkpoint: str | None) -> str | None:
-    if checkpoint is None:
+def missing(problem: Problem, *, factors: str, correct: str, checkpoint: str) -> str | None:
+    if checkpoint == WHOLE:
         return None
     if not isinstance(problem, Transient):
         return f"adjoint[checkpoint={checkpoint}] marches back in time, {problem.name} has no steps"
@@ -52,10 +57,10 @@ def adjoint(
     *,
     factors: Factors = "refined",
     correct: Correct = "no",
-    checkpoint: Checkpoint = None,
+    checkpoint: Checkpoint = WHOLE,
 ) -> Result:
     """R_u^T lam = -J_u,  dJ/dp = J_p + lam^T R_p."""
-    if checkpoint is not None:
+    if checkpoint != WHOLE:
         assert isinstance(model.problem, Transient)  # see `missing`
         return march_back(model, p, Schedule.of(checkpoint, model.problem.steps, "adjoint"))
     state = model.solve(p)

@@ -16,7 +16,7 @@ from gradient_routes.problems.problem import Array
 
 March = Callable[[int, Array], Array]  # (t, u_{t-1}) -> u_t
 Step = tuple[int, Array, Array]  # t, u_{t-1}, u_t
-CHOICES = "all, none, sqrt, every=K or revolve=S"
+CHOICES = "whole, all, none, sqrt, every=K or revolve=S"
 
 
 @dataclass(frozen=True)

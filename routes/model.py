@@ -164,6 +164,7 @@ class Model:
         load steps.
         """
         self.tally.count("forward_solves")
+        self.tally.count("steps", self.problem.steps)
         steps = Recorded(self._operations(p))
         try:
             self._newton(self.initial(p), p, None, steps, polish=k, at_most=k, taken=steps.taken)

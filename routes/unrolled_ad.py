@@ -38,7 +38,9 @@ def cost(
     if inner == "direct":
         k, known = iterations, forward.counted
         residuals = 1 + k + forward.halvings() if known is None else known.residuals
-        return Work(1, k, residuals, assemblies=k, factorizations=k, solves=k, transposed_solves=k)
+        return Work(
+            1, k, residuals, assemblies=k, factorizations=k, solves=k, transposed_solves=k, steps=forward.cold.steps
+        )
     again = 0 if checkpoint is None else iterations - iterations % checkpoint
     return Work(forward_solves=1, residuals=2, matvecs=(newton or 1) * (2 * iterations + again))
 

@@ -137,6 +137,7 @@ ORDER = (
     "rod",
     "coupon",
     "advection",
+    "vibrating-bar",
     "fd-one-sided",
     "fd-central",
     "complex-step",

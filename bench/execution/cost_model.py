@@ -32,7 +32,7 @@ class Prices:
     declared: ForwardWork
 
     def seconds(self, work: Work) -> float:
-        """Predicted seconds: factorizations as cold forward solves, plus the remaining substitutions and products.
+        """Predicted seconds: factorizations as cold forward solves, plus other substitutions, products and steps.
 
         A residual is taken to cost as much as a product. Chord steps reuse factors and count as substitutions.
         """
@@ -40,7 +40,9 @@ class Prices:
         times = work.factorizations / cold.factorizations if cold.factorizations else work.forward_solves
         substitutions = work.solves + work.transposed_solves - times * cold.solves
         products = work.matvecs + work.residuals - times * (cold.matvecs + cold.residuals)
-        return times * self.forward.wall + max(0.0, substitutions) * self.solve + max(0.0, products) * self.matvec
+        again = work.steps / cold.steps - times if cold.steps else 0.0  # marches
+        solves = times + max(0.0, again)
+        return solves * self.forward.wall + max(0.0, substitutions) * self.solve + max(0.0, products) * self.matvec
 
 
 def prices(model: Model, p: Array) -> tuple[Prices, State | None]:
@@ -101,5 +103,6 @@ def summary(work: Work) -> str:
         (substitutions, "lin"),
         (work.transposed_solves, "adj"),
         (work.matvecs, "mv"),
+        (work.steps, "steps"),
     )
     return " + ".join(f"{count if count < 1e6 else f'{count:.2g}'} {name}" for count, name in parts if count > 0)
