@@ -29,7 +29,7 @@ class RecurrenceFactorization(Factorization):
     def substitute(self, b: Array, transposed: bool) -> Array:
         M, steps = self._matrix, self._matrix.steps
         b = b.reshape(steps, -1)
-        z = np.empty_like(b, dtype=np.result_type(b, *(block.dtype for block in self._blocks)))
+        z: list[Any] = [None] * steps
         last = len(self._blocks) - 1
         transposed ^= M.transposed
         for t in range(steps)[:: -1 if transposed else 1]:
@@ -39,7 +39,7 @@ class RecurrenceFactorization(Factorization):
             elif not transposed and t:
                 r = r - M.below(t) @ z[t - 1]
             z[t] = self._blocks[min(t, last)].substitute(r, transposed)
-        return z.ravel()
+        return np.concatenate(z)
 
 
 class StepFactorization(Factorization):
@@ -51,11 +51,12 @@ class StepFactorization(Factorization):
         from scipy.linalg.lapack import get_lapack_funcs
 
         S = A.schur
-        factor, self._solve = get_lapack_funcs(("gttrf", "gttrs"), (S.main, S.lower))
+        routines: Any = get_lapack_funcs(("gttrf", "gttrs"), (S.main, S.lower))
+        factor, self._solve = routines
         *self._lu, info = factor(S.lower, S.main, S.upper)
         if info:
             raise SingularMatrix(f"{who}: R_u of a step: pivot {info} is zero - choose another dt")
-        self._A, self.norm, self.dtype = A, A.norm, S.main.dtype
+        self._A, self.norm = A, A.norm
 
     @property
     def nbytes(self) -> int:
