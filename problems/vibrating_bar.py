@@ -1,20 +1,23 @@
 """The vibrating bar: N two-node elements of the bar with mass, fixed at x = 0, struck at x = L, marched in time.
 
-M u'' + C u' + K(E) u = f(t),    M = rho A L_e diag(1, .., 1, 1/2),    C = c_M M + c_K K + c_G G, G skew
+M u'' + C u' + K(E) u + q(u_N) e_N = f(t),    M = rho A L_e diag(1, .., 1, 1/2),    C = c_M M + c_K K + c_G G, G skew
 
-The state of a step is z_t = (u_t, v_t); all steps together are one linear problem R(U, p) = 0, U = (z_1, .., z_T),
-whose R_U is block lower bidiagonal: every route solves it by a march, and its transpose by a march back.
+The state of a step is z_t = (u_t, v_t); all steps together are one problem R(U, p) = 0, U = (z_1, .., z_T), whose R_U
+is block lower bidiagonal: every route solves it by a march, and its transpose by a march back. It is linear unless the
+tip meets a stop, of force q.
 """
 
 from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from gradient_routes.problems.bar import THETA_MAX, true_modulus
+from gradient_routes.problems.contact import K_C, STOP_WIDTH, CompliantStop, RigidStop, make_stop
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
@@ -27,7 +30,9 @@ from gradient_routes.problems.problem import Array, Linearization, Offers, Param
 from gradient_routes.problems.transient import Transient
 
 N_MAX, STEPS_MAX, STATE_MAX = 10**5, 10**6, 10**8
+GAP = 0.2  # [m], half of what the tip moves by the pulse
 Damping = Literal["none", "rayleigh", "skew"]
+MovingStop = Literal["none", "penalty", "softplus", "quadratic"]
 
 
 class VibratingBar(Transient):
@@ -44,6 +49,7 @@ class VibratingBar(Transient):
     from_rest = True
     typical = 0
     regularization: Prior
+    stop: CompliantStop | None = None
 
     def __init__(
         self,
@@ -64,6 +70,10 @@ class VibratingBar(Transient):
         area: Annotated[float, "cross-section A [m2]"] = 1.0,
         force: Annotated[float, "largest F at the end [N]"] = 1.0,
         pulse: Annotated[float, "duration of F, a sine squared [s]"] = 0.5,
+        stop: Annotated[MovingStop, "beyond the tip, yielding by k_c"] = "none",
+        gap: Annotated[float, "that the tip may move before it meets the stop [m]"] = GAP,
+        k_c: Annotated[float, "stiffness of the stop [N/m]"] = K_C,
+        width: Annotated[float, "over which softplus and quadratic round the kink of the penalty [m]"] = STOP_WIDTH,
         noise: Annotated[float, "standard deviation added to data [m]"] = 0.0,
         seed: Annotated[int, "of that noise"] = 0,
         alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
@@ -87,6 +97,10 @@ class VibratingBar(Transient):
                 raise InputError(f"vibrating-bar: {name}={size:g} - choose a finite {name} >= 0")
         if seed < 0:
             raise InputError(f"vibrating-bar: seed={seed} - choose seed >= 0")
+        made = make_stop(stop, gap, k_c, width, self.name)
+        assert not isinstance(made, RigidStop)
+        if made is not None:
+            self.stop, self.linear, self.constant = made, False, False
         self.n, self.steps, self.h, self.scheme = n, steps, dt, SCHEMES[scheme]
         self.n_state = 2 * n * steps
         self.L_e, self.A, self.E_0 = length / n, area, modulus
@@ -143,6 +157,9 @@ class VibratingBar(Transient):
             driven = driven + h * self.c_M * self.mass * scheme.damping(v)
         if self.skew.any():
             driven = driven + h * scheme.damping(self._gyroscopic(v, xp))
+        if self.stop is not None:
+            pressed = h * scheme.force(self.stop.law.force(x[:, -1] - self.stop.gap, xp))
+            driven = xp.concatenate([driven[:, :-1], driven[:, -1:] + pressed[:, None]], axis=1)
         return xp.stack([moved, driven], axis=1)
 
     def _gyroscopic(self, v: Any, xp: Any) -> Any:
@@ -154,7 +171,20 @@ class VibratingBar(Transient):
     def tangent(self, u: Array, p: Array) -> Recurrence:
         """Raises DomainError where an explicit step is too long for p."""
         A, B = self.step_matrices(p)
-        return Recurrence((A,), (B,), self.steps)
+        if self.stop is None:
+            return Recurrence((A,), (B,), self.steps)
+        tips = self.history(u)[0][:, -1]
+        new, old = ([self.with_stop(M, tip) for tip in at] for M, at in ((A, tips[1:]), (B, tips[:-1])))
+        return Recurrence(new, old, self.steps)
+
+    def with_stop(self, M: StepMatrix, tip: Any) -> StepMatrix:
+        """A or B where the tip is at this displacement [m]."""
+        if self.stop is None:
+            return M
+        weight = self.h * (self.scheme.of_force if M.a > 0.0 else 1.0 - self.scheme.of_force)
+        main = M.K.main.astype(np.result_type(M.K.main, tip))
+        main[-1] += weight * self.stop.law.stiffness(tip - self.stop.gap)
+        return replace(M, K=replace(M.K, main=main))
 
     def step_matrices(self, p: Array) -> tuple[StepMatrix, StepMatrix]:
         """A and B of A z_t + B z_{t-1}, the same for all steps. Raises DomainError, see `tangent`."""
@@ -179,6 +209,13 @@ class VibratingBar(Transient):
 
     def at(self, t: int) -> BarStep:
         return BarStep(self, t)
+
+    def active_set(self, u: Array, p: Array) -> str | None:
+        """The steps, counted from 1, after which a stop of the penalty law is closed."""
+        if self.stop is None or self.stop.law.active_set(0.0) is None:
+            return None
+        closed = np.flatnonzero(self.history(u)[0][1:, -1].real > self.stop.gap) + 1
+        return ",".join(map(str, closed)) or "open"
 
     def _check_stable(self, k: Array) -> None:
         """h <= 2 / omega_max for an explicit scheme, omega_max^2 bounded by the largest row sum of M^{-1} K."""

@@ -37,7 +37,7 @@ class LinearizedSolver:
         self.model, self.state = model, state
         self.rtol = model.solver.adjoint_rtol
         self.A, self.R_u = state.factors.to(self.rtol), None
-        if model.problem.linear or factors == "stale":
+        if model.problem.linear or model.problem.steps or factors == "stale":  # a march leaves factors at u
             return
         known = state.rate is not None and math.isfinite(state.rate)
         too_far = known and solves * products_to(state.rate or 0.0, 1.0, self.rtol) > WORTH
@@ -95,7 +95,7 @@ def work(forward: ForwardWork, solves: int, transposed: bool, factors: str) -> W
     kind = "transposed_solves" if transposed else "solves"
     if forward.linear or factors == "stale":
         return forward.cold + Work(**{kind: solves})
-    if factors == "fresh":
+    if factors == "fresh" or forward.cold.steps:
         return forward.cold + forward.factors_at_solution() + Work(**{kind: solves})
     sweeps, renewals = forward.sweeps(solves), forward.renewals()
     assemblies = renewals if forward.matrix_free else 1

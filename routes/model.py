@@ -11,6 +11,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import NotConverged, SingularMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, Problem, Traced
+from gradient_routes.problems.transient import Transient
 from gradient_routes.routes.load_stepping import by_load_steps
 from gradient_routes.routes.newton import Newton, Solver, State, System, newton, norm, rounding, unwatched
 from gradient_routes.routes.newton_steps import (
@@ -25,9 +26,9 @@ from gradient_routes.routes.newton_steps import (
     Truncated,
 )
 from gradient_routes.routes.precision import double, double_operator
-from gradient_routes.routes.solvers.factorization import Factorizer
+from gradient_routes.routes.solvers.factorization import Deferred, Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
-from gradient_routes.routes.tally import Tally, Work
+from gradient_routes.routes.tally import KINDS, Tally, Work
 
 
 class Model:
@@ -141,6 +142,8 @@ class Model:
         before = self.tally.work
         self.tally.count("forward_solves")
         self.tally.count("steps", self.problem.steps)
+        if isinstance(self.problem, Transient) and not self.problem.linear:
+            return self._marched(self.problem, p, polish, before)
         u = self.initial(p) if start is None else start.u.astype(p.dtype)
         scale = None if start is None else start.scale
         try:
@@ -156,6 +159,21 @@ class Model:
         assert steps.factors is not None  # at least one step was taken
         J = self.objective(u, p)
         return State(p, u, J, history, scale, steps.factors, self.tally.work - before, steps.rate)
+
+    def _marched(self, problem: Transient, p: Array, polish: int, before: Work) -> State:
+        """The state after every step, each solved for by full Newton steps to the tolerance of the whole."""
+        u, states, left, solver, tally = problem.initial_state(p), [], 0.0, replace(self.solver, newton="full"), Tally()
+        scale = norm(self.residual(self.initial(p), p))
+        for t in range(1, problem.steps + 1):
+            step, q = Model(problem.at(t), solver, tally), np.concatenate([u, p])
+            u, history, _ = step._newton(step.initial(q), q, scale, step._direction(q), polish=polish)
+            states.append(u)
+            left = max(left, history[-1])
+        for kind in KINDS:
+            self.tally.count(kind, vars(tally.work)[kind])
+        U = np.concatenate(states)
+        factors = Deferred(problem.tangent(U, p).norm, lambda: self.factorize(self.tangent(U, p)))
+        return State(p, U, self.objective(U, p), (left,), scale, factors, self.tally.work - before)
 
     def newton_iterates(self, p: Array, k: int) -> tuple[list[Step], float]:
         """The first k full Newton steps of a cold solve, with its line search, and |R|_inf / |R_0|_inf after them.
@@ -177,7 +195,8 @@ class Model:
     @property
     def newton(self) -> Newton:
         """The steps by which real states are solved for."""
-        return "full" if self.problem.linear or not self.problem.line_search else self.solver.newton
+        problem = self.problem
+        return "full" if problem.linear or problem.steps or not problem.line_search else self.solver.newton
 
     def _operations(self, p: Array) -> Operations:
         problem = self.problem

@@ -19,12 +19,11 @@ class BarStep(Problem):
     """R_t(z, q) = 0, z = (u, v) (2 N,) after step t, q = (z before it, p) (3 N,); J_t, the last with alpha Phi."""
 
     offers = Offers.LINEARIZE | Offers.COMPLEX
-    linear = True
 
     def __init__(self, bar: VibratingBar, t: int) -> None:
         self.bar, self.t, self.n_state = bar, t, 2 * bar.n
         self.name = f"{bar.name}, step {t}"
-        self.last = t == bar.steps
+        self.last, self.linear = t == bar.steps, bar.linear
         start, scale = np.zeros(2 * bar.n), np.ones(2 * bar.n)
         q = bar.parameters
         lower, upper = (np.broadcast_to(bound, q.start.shape) for bound in (q.lower, q.upper))
@@ -46,6 +45,11 @@ class BarStep(Problem):
         """Displacements and velocities (2, 2, N) before and after the step."""
         return np.stack([before, z]).reshape(2, 2, -1)
 
+    def initial(self, p: Array) -> Array:
+        """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
+        u, v = p[: self.n_state].reshape(2, -1)
+        return np.concatenate([u + self.bar.h * v, v])
+
     def residual(self, u: Array, p: Array) -> Array:
         before, modulus = self._split(p)
         both = self._histories(u, before)
@@ -54,7 +58,10 @@ class BarStep(Problem):
         )
 
     def tangent(self, u: Array, p: Array) -> StepMatrix:
-        return self.bar.step_matrices(self._split(p)[1])[0]
+        return self.bar.with_stop(self.bar.step_matrices(self._split(p)[1])[0], u[self.bar.n - 1])
+
+    def active_set(self, u: Array, p: Array) -> str | None:
+        return None if self.bar.stop is None else self.bar.stop.law.active_set(u[self.bar.n - 1] - self.bar.stop.gap)
 
     def objective(self, u: Array, p: Array) -> Any:
         bar, modulus = self.bar, self._split(p)[1]
@@ -67,5 +74,6 @@ class BarStep(Problem):
         J_u = np.zeros_like(u)
         J_u[bar.nodes - 1] = u[bar.nodes - 1] - bar.data()[self.t - 1]
         J_p = bar.by_prior(modulus) if self.last else np.zeros_like(modulus)
-        R_q = Beside(bar.step_matrices(modulus)[1], bar.by_modulus(both[:, 0], both[:, 1], modulus), self.n_state)
+        R_v = bar.with_stop(bar.step_matrices(modulus)[1], before[bar.n - 1])
+        R_q = Beside(R_v, bar.by_modulus(both[:, 0], both[:, 1], modulus), self.n_state)
         return Linearization(R_q, J_u, np.concatenate([np.zeros_like(before), J_p]))

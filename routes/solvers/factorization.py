@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -112,3 +113,25 @@ class BlockFactorization(Factorization):
     def negative_eigenvalues(self) -> int | None:
         counts = [block.negative_eigenvalues for block in self.blocks]
         return None if None in counts else sum(count for count in counts if count is not None)
+
+
+class Deferred(Factorization):
+    """Factors that are made when they are first asked for."""
+
+    def __init__(self, norm: float, make: Callable[[], Factorization]) -> None:
+        self.norm, self._make = norm, make
+
+    @cached_property
+    def _made(self) -> Factorization:
+        return self._make()
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self._made.name
+
+    @property
+    def nbytes(self) -> int:
+        return self._made.nbytes
+
+    def substitute(self, b: Array, transposed: bool) -> Array:
+        return self._made.substitute(b, transposed)
