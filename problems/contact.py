@@ -191,12 +191,14 @@ class RigidStop:
 Stop = CompliantStop | RigidStop
 
 
-def make_stop(kind: StopName, gap: float, k_c: float, width: float, who: str) -> Stop | None:
-    """The stop for these options, None for kind=none. Raises InputError for invalid or unused options."""
+def make_stop(kind: StopName, gap: float, k_c: float, width: float, who: str, default: float = GAP) -> Stop | None:
+    """The stop for these options, None for kind=none. Raises InputError for invalid options, and for unused ones unless
+    they are the defaults, `default` of the gap.
+    """
     smooth = kind in ("softplus", "quadratic")
     check_applies(
         who,
-        ("stop=penalty, say", kind != "none", True, {"gap": gap != GAP}),
+        ("stop=penalty, say", kind != "none", True, {"gap": gap != default}),
         ("stop=penalty, softplus or quadratic", kind == "penalty" or smooth, True, {"k_c": k_c != K_C}),
         ("stop=softplus or quadratic", smooth, True, {"width": width != STOP_WIDTH}),
     )

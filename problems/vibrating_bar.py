@@ -17,14 +17,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from gradient_routes.problems.bar import THETA_MAX, true_modulus
-from gradient_routes.problems.contact import K_C, STOP_WIDTH, CompliantStop, RigidStop, make_stop
+from gradient_routes.problems.contact import K_C, STOP_WIDTH, CompliantStop, RigidStop, Stop, make_stop
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
 from gradient_routes.problems.dynamics.bar_step import BarStep
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
 from gradient_routes.problems.dynamics.step_matrix import Banded, StepMatrix
-from gradient_routes.problems.errors import DomainError, InputError, check_applies
+from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Traced
 from gradient_routes.problems.transient import Transient
@@ -97,7 +97,7 @@ class VibratingBar(Transient):
                 raise InputError(f"vibrating-bar: {name}={size:g} - choose a finite {name} >= 0")
         if seed < 0:
             raise InputError(f"vibrating-bar: seed={seed} - choose seed >= 0")
-        made = make_stop(stop, gap, k_c, width, self.name)
+        made = make_stop(stop, gap, k_c, width, self.name, GAP)
         assert not isinstance(made, RigidStop)
         if made is not None:
             self.stop, self.linear, self.constant = made, False, False
@@ -174,10 +174,10 @@ class VibratingBar(Transient):
         if self.stop is None:
             return Recurrence((A,), (B,), self.steps)
         tips = self.history(u)[0][:, -1]
-        new, old = ([self.with_stop(M, tip) for tip in at] for M, at in ((A, tips[1:]), (B, tips[:-1])))
+        new, old = ([self.pressed_matrix(M, tip) for tip in at] for M, at in ((A, tips[1:]), (B, tips[:-1])))
         return Recurrence(new, old, self.steps)
 
-    def with_stop(self, M: StepMatrix, tip: Any) -> StepMatrix:
+    def pressed_matrix(self, M: StepMatrix, tip: Any) -> StepMatrix:
         """A or B where the tip is at this displacement [m]."""
         if self.stop is None:
             return M
@@ -209,6 +209,14 @@ class VibratingBar(Transient):
 
     def at(self, t: int) -> BarStep:
         return BarStep(self, t)
+
+    def with_stop(self, stop: Stop) -> VibratingBar:
+        """This bar with another stop but unchanged data."""
+        if isinstance(stop, RigidStop):
+            raise NotOffered("vibrating-bar: a rigid stop needs a multiplier, which its steps do not have")
+        other = copy.copy(self)
+        other.stop, other.linear, other.constant = stop, False, False
+        return other
 
     def active_set(self, u: Array, p: Array) -> str | None:
         """The steps, counted from 1, after which a stop of the penalty law is closed."""

@@ -58,7 +58,7 @@ class BarStep(Problem):
         )
 
     def tangent(self, u: Array, p: Array) -> StepMatrix:
-        return self.bar.with_stop(self.bar.step_matrices(self._split(p)[1])[0], u[self.bar.n - 1])
+        return self.bar.pressed_matrix(self.bar.step_matrices(self._split(p)[1])[0], u[self.bar.n - 1])
 
     def active_set(self, u: Array, p: Array) -> str | None:
         return None if self.bar.stop is None else self.bar.stop.law.active_set(u[self.bar.n - 1] - self.bar.stop.gap)
@@ -74,6 +74,6 @@ class BarStep(Problem):
         J_u = np.zeros_like(u)
         J_u[bar.nodes - 1] = u[bar.nodes - 1] - bar.data()[self.t - 1]
         J_p = bar.by_prior(modulus) if self.last else np.zeros_like(modulus)
-        R_v = bar.with_stop(bar.step_matrices(modulus)[1], before[bar.n - 1])
+        R_v = bar.pressed_matrix(bar.step_matrices(modulus)[1], before[bar.n - 1])
         R_q = Beside(R_v, bar.by_modulus(both[:, 0], both[:, 1], modulus), self.n_state)
         return Linearization(R_q, J_u, np.concatenate([np.zeros_like(before), J_p]))

@@ -65,5 +65,10 @@ class StepMatrix:
         return Banded(D.lower + by * K.lower, D.main + by * K.main, D.upper + by * K.upper)
 
     @property
+    def dense(self) -> Array:
+        """(2 N, 2 N)."""
+        return np.stack([self @ e for e in np.eye(2 * len(self.K.main))], axis=1)
+
+    @property
     def norm(self) -> float:
         return max(abs(self.a) + abs(self.b), self.K.norm + self.D.norm)

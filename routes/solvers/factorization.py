@@ -40,7 +40,7 @@ class Factorizer:
         if isinstance(A, Recurrence):
             return RecurrenceFactorization(A, lambda block: self(block, who))
         if isinstance(A, StepMatrix):
-            return StepFactorization(A, who)
+            return StepFactorization(A, who) if len(A.K.main) > 2 else DenseFactorization(A.dense, who)
         if self.solver.takes(A):
             return self._factorize(A, who)
         if isinstance(A, Tridiagonal):

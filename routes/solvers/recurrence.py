@@ -43,7 +43,9 @@ class RecurrenceFactorization(Factorization):
 
 
 class StepFactorization(Factorization):
-    """L U of the Schur complement D - b/a K (LAPACK gttrf, real or complex)."""
+    """L U of the Schur complement D - b/a K (LAPACK gttrf, real or complex), of three nodes or more: SciPy's interface
+    refuses less.
+    """
 
     name = "LAPACK tridiagonal L U"
 
