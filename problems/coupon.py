@@ -189,9 +189,9 @@ class Coupon(Problem):
 
         (S_u, S_p), _ = self._sensing(u, p)
         label = [f"{mode} {lam:.4g}" for mode, lam in zip(self.modes, self.states.stretch, strict=True)]
-        return Observation(
-            self.stresses(u, p)[0], self._data(), sparse.diags_array(S_u).tocsr(), S_p, self.noise, label.__getitem__
-        )
+        at, mode, by_u = self.states.stretch[:, None], np.array(self.modes), sparse.diags_array(S_u).tocsr()
+        S, name = self.stresses(u, p)[0], label.__getitem__
+        return Observation(S, self._data(), by_u, S_p, self.noise, name, position=at, quantity=mode)
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         return self.regularization, p, np.ones_like(p)

@@ -201,7 +201,8 @@ class Rod(Problem):
     def observation(self, u: Array, p: Array) -> Observation:
         x, S = self.sensors.x, self.sensors.matrix()[:, self.free]
         predicted = self.sensors.read(self.excess(u))
-        return Observation(predicted, self._data(), S, sigma=self.noise, label=lambda k: f"T at {x[k]:.3g}")
+        label, at = (lambda k: f"T at {x[k]:.3g}"), x[:, None]
+        return Observation(predicted, self._data(), S, sigma=self.noise, label=label, position=at)
 
     def candidates(self) -> Candidates:
         """The temperature of every free node."""

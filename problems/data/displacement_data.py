@@ -12,6 +12,7 @@ from gradient_routes.problems.data.motion import Motion
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.probes import Probes
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.fem.mesh import AXES
 from gradient_routes.problems.mechanics.design_variables import Setup
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.problem import Array
@@ -92,7 +93,8 @@ class DisplacementData:
         data = np.concatenate([d[case][measured] for case in cases])
         S_p = S_a if self.solid.grip_is_parameter else None
         at = np.tile(self.probes.x[np.nonzero(measured)[0]], (len(d), 1))
-        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=at)
+        quantity = np.concatenate([self._quantities(case) for case in cases])
+        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=at, quantity=quantity)
         if self.probes.weights is not None:
             seen = seen.weighted(np.tile(self.probes.weights[measured], len(d)))
         return seen if self.motion is None else seen.without(self.motion, len(d))
@@ -134,6 +136,12 @@ class DisplacementData:
         case, k = divmod(k, len(points))
         return self._name(int(components[k]), self.probes.x[points[k]], case)
 
+    def _quantities(self, case: int) -> Array:
+        names = [f"u{axis}{self._of_case(case)}" for axis in AXES[: self.probes.x.shape[1]]]
+        return np.array(names)[np.nonzero(self.probes.measured)[1]]
+
+    def _of_case(self, case: int) -> str:
+        return f", case {case + 1}" if self._cases > 1 else ""
+
     def _name(self, component: int, x: Array, case: int) -> str:
-        which = f", case {case + 1}" if self._cases > 1 else ""
-        return f"u_{'xyz'[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){which}"
+        return f"u_{AXES[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){self._of_case(case)}"

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gradient_routes.bench.cases.case import problems, routes
-from gradient_routes.bench.inversion.fit import Residuals, fitted
+from gradient_routes.bench.inversion.fit import fitted
 from gradient_routes.bench.inversion.invert import Engine, invert
+from gradient_routes.bench.inversion.residuals import Residuals
 from gradient_routes.problems.data.observation import Observation
 
 SIGMA = 1e-3
