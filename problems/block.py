@@ -51,6 +51,7 @@ class Block(Solid):
         modulus: options.Modulus = None,
         derivatives: options.Derivatives = None,
         unknown: Annotated[DesignName, "what p is"] = "modulus",
+        constants: options.Constants = None,
         parametrization: Annotated[Literal["log", "raw"] | None, "of moduli: p = log E or p = E [log]"] = None,
         layers: Annotated[int | None, "along z, for unknown=layers [4, fewer on a coarse mesh]"] = None,
         surface: Annotated[str, "face whose nodes move, for unknown=shape"] = "right",

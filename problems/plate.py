@@ -65,6 +65,7 @@ class Plate(Solid):
         modulus: options.Modulus = None,
         derivatives: options.Derivatives = None,
         unknown: Annotated[PlaneDesign, "what p is"] = "modulus",
+        constants: options.Constants = None,
         parametrization: Annotated[
             Literal["log", "raw"] | None, "of moduli and thickness: p = log E or E [log]"
         ] = None,

@@ -78,6 +78,18 @@ FIT = (
     Column("verdict", "TEXT", "", "explained, or why the model does not explain the data"),
 )
 
+CONSTANTS = (
+    *RUN,
+    Column("constant", "TEXT", "", "as people state it, with its unit, or a parameter"),
+    Column("value", "REAL", "its own", "at the end"),
+    Column("sd", "REAL", "its own", "its standard deviation by the noise; none where data do not see it"),
+    Column("third_1", "REAL", "its own", "what the first third of the data along their longest extent says alone"),
+    Column("third_2", "REAL", "its own", "the second"),
+    Column("third_3", "REAL", "its own", "the last"),
+    Column("bound", "TEXT", "", "of its domain, where it has gone there"),
+    Column("correlations", "TEXT", "1", "with the others, by name", json=True),
+)
+
 RESIDUALS = (
     *RUN,
     Column("datum", "TEXT", "", "its name"),

@@ -1,4 +1,4 @@
-"""How well measured data are met, as rows: of all of them, and of each."""
+"""How well measured data are met, as rows: of all of them, of constants, and of each."""
 
 from __future__ import annotations
 
@@ -19,6 +19,22 @@ def of_all(fit: Fit) -> Row:
     noise = {"noise": r.noise or None, "noise_source": r.source or None, "chi2": r.chi2 if r.noise else None}
     own = {"data": r.count, "outliers": r.outliers, "freedom": r.freedom, "rms": r.inner_rms}
     return own | noise | {"moran": I, "moran_z": z, "verdict": r.verdict or "explained"}
+
+
+def of_constants(fit: Fit) -> Iterator[Row]:
+    c = fit.constants
+    for i, name in enumerate(() if c is None else c.names):
+        assert c is not None
+        correlated = {other: float(r) for other, r in zip(c.names, c.correlation[i], strict=True) if not np.isnan(r)}
+        thirds = [*c.thirds.get(name, ()), None, None, None][:3]
+        yield {
+            "constant": name,
+            "value": float(c.value[i]),
+            "sd": None if np.isnan(c.sd[i]) else float(c.sd[i]),
+            **{f"third_{k + 1}": third for k, third in enumerate(thirds)},
+            "bound": c.bounds.get(name.partition(" [")[0]),
+            "correlations": correlated,
+        }
 
 
 def of_each(fit: Fit) -> Iterator[Row]:

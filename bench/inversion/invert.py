@@ -143,7 +143,8 @@ class Inversion:
         if self.fit is None:
             return found
         each = [self.shared | row for row in fit_rows.of_each(self.fit)]
-        return found | {"fit": [self.shared | fit_rows.of_all(self.fit)], "residuals": each}
+        said = [self.shared | row for row in fit_rows.of_constants(self.fit)]
+        return found | {"constants": said, "fit": [self.shared | fit_rows.of_all(self.fit)], "residuals": each}
 
     def _estimate(self, i: int) -> Row:
         q = self.made.parameters

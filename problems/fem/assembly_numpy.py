@@ -72,13 +72,15 @@ class NumpyAssembly:
         return K
 
     def R_p(self, u: Array, p: Array) -> ByProducts:
-        """R_p (n_u, n_p): each material constant of a cell depends on one parameter."""
+        """R_p (n_u, n_p): each material constant of a cell depends on one parameter, or p on all of them by dq/dp."""
         solid, derivative = self.solid, self.solid.design.q_p
         assert derivative is not None, "Block refuses p that is not a material"
         s, q_p = solid.setup(p), derivative(p)
+        by_p = None if solid.design.chain is None else solid.design.chain(p)
         f_q = [self._by_constants(solid.displacements(u, s, case, self.nodes), s, q_p) for case in self._cases]
 
         def forward(v: Array) -> Array:
+            v = v if by_p is None else by_p @ v
             forces = (sum(f * v[of, None, None] for f, (_, of) in zip(f_case, q_p, strict=True)) for f_case in f_q)
             return np.concatenate(
                 [solid.bc.assemble(np.asarray(f), self.nodes, case)[0] for case, f in enumerate(forces)]
@@ -90,7 +92,7 @@ class NumpyAssembly:
                 lam_e = solid.bc.displacements(lam, 0.0, case, self.nodes, np)
                 for f, (_, of) in zip(f_case, q_p, strict=True):
                     total = total + accumulate(of, (f * lam_e).sum(axis=(1, 2)), len(p))
-            return total
+            return total if by_p is None else np.asarray(by_p.T @ total)
 
         return ByProducts(forward, reverse)
 

@@ -21,6 +21,7 @@ from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions,
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
 from gradient_routes.problems.mechanics import design_variables
+from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.design_variables import (
     CELLWISE,
     FIELDS,
@@ -35,6 +36,7 @@ from gradient_routes.problems.mechanics.load_direction import load_direction
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.problem import (
     Array,
+    End,
     Fields,
     Linearization,
     Offers,
@@ -89,6 +91,7 @@ class Solid(Problem):
             directions = load_direction(o.direction, top, self.name)[None]
         traction = o.traction if o.force is None else o.force / area
         amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
+        self.constants = None if o.constants is None else Constants.parse(o.constants, law, self.name)
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
         q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
@@ -96,7 +99,11 @@ class Solid(Problem):
             "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, E, o.layers),
             "regions": lambda: design_variables.regions(mesh, law, o.nu, self.log, uniform, E),
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
-            "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
+            "constants": lambda: (
+                self.constants.design(mesh, law, o.nu, E)
+                if self.constants
+                else design_variables.constants(mesh, law, o.nu, E)
+            ),
             "traction": lambda: design_variables.tractions(mesh, top, traction * directions[0]),
             "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d(clamp, top.node_set)),
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
@@ -123,7 +130,8 @@ class Solid(Problem):
             self.data = self._from_file(found)
             self.read_as = (*found.notes, *self._load_in_words(o.loaded))
             self.notes += self.read_as
-            self.start_from_data = o.modulus is None and o.unknown in FITTED and not gripped
+            told = o.modulus is not None or (self.constants is not None and bool({*self.constants.start} - {"nu"}))
+            self.start_from_data = not told and o.unknown in FITTED and not gripped
         elif o.markers:
             in_plane = o.components == "in-plane"
             self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
@@ -243,6 +251,8 @@ class Solid(Problem):
         """Where p sets the material, and a load is given rather than a displacement."""
         if self._options["unknown"] not in MATERIAL or self.solid.load == "displacement":
             return None
+        if self.solid.design.by_stiffness is not None:
+            return np.asarray(p + np.log(factor) * self.solid.design.by_stiffness)
         return p + np.log(factor) if self._is_log else factor * p
 
     def stiffened(self, factor: float) -> Solid:
@@ -257,14 +267,20 @@ class Solid(Problem):
 
     @property
     def _is_log(self) -> bool:
-        return self.log and self.solid.design.field is not None
+        design = self.solid.design
+        return (self.log and design.field is not None) or design.by_stiffness is not None
 
     def stated(self, p: Array) -> dict[str, Any]:
-        """Young's modulus and Poisson's ratio, where p are Lame's constants."""
+        """Constants as people state them, E and nu besides; of laws that have them."""
+        if self.constants is not None and self.constants.paired:
+            return self.constants.stated(p)
         if self._options["unknown"] != "constants" or self.solid.law.constants != ("mu", "lam"):
             return {}
         mu, lam = p
         return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)}
+
+    def ends(self, p: Array) -> list[End]:
+        return self.constants.ends(p) if self.constants is not None and self.constants.paired else []
 
     # --- synthetic data
 

@@ -28,11 +28,16 @@ REACHED = (
 
 def section(source: Source) -> Section | None:
     rows = [row | {"run": named(row)} for row in source.table("inversion")]
-    found, met, missed = (
+    found, constants, met, missed = (
         [row | {"run": named(row), "panel": f"{row['problem']} by {named(row)}"} for row in source.table(table)]
-        for table in ("estimates", "fit", "residuals")
+        for table in ("estimates", "constants", "fit", "residuals")
     )
-    fields = *estimates.figures(found), *residuals.fits(met), *residuals.figures(missed)
+    fields = (
+        *estimates.figures(found),
+        *residuals.constants(constants),
+        *residuals.fits(met),
+        *residuals.figures(missed),
+    )
     figures = (history(rows), reached(rows), *fields, *regularization.figures(source))
     drawn = tuple(f for f in figures if f is not None)
     says = "From gradients to parameters: the misfit step by step, what was found, how much to regularize."

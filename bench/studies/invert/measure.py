@@ -98,7 +98,7 @@ class Run:
         one_shot = self._one_shot(problem)
         done = self._until_it_ends(self._inversions(problem, starts, minibatch, seed, one_shot))
         kept = [found.tables for found in done]
-        for table in ("inversion", "estimates", "fit", "residuals"):
+        for table in ("inversion", "estimates", "constants", "fit", "residuals"):
             for tables in kept:
                 self._keep(table, tables.get(table, ()))
         self.say(Found(Compared(done)))

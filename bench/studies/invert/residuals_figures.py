@@ -27,6 +27,16 @@ def fits(rows: Sequence[Row]) -> list[Figure]:
     return [Figure("fits", "How well data are met", "; ".join([counted, *dict.fromkeys(wrong)]) + ".", table)]
 
 
+def constants(rows: Sequence[Row]) -> list[Figure]:
+    """A table."""
+    if not rows:
+        return []
+    names = "problem route optimizer alpha run constant value sd third_1 third_2 third_3 bound"
+    table = Table.of(fields.columns("constants", names).columns, rows)
+    says = "Error bars know the noise; thirds of the data differ by what the model leaves out."
+    return [Figure("constants", "Constants", says, table)]
+
+
 def figures(rows: Sequence[Row]) -> list[Figure]:
     """By quantity: along a line as points, over a body as a map."""
     if not rows:
