@@ -11,6 +11,7 @@ import numpy as np
 from gradient_routes.problems.data.motion import Motion
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.probes import Probes
+from gradient_routes.problems.data.strain_gauges import StrainGauges
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.mesh import AXES
 from gradient_routes.problems.mechanics.design_variables import Setup
@@ -25,6 +26,7 @@ class DisplacementData:
     d (cases, m, d)  [m], None for synthetic data that are not computed yet
     noise            standard deviation of the noise on d [m]
     motion           what is eliminated from J, in every load case for itself
+    strains          measured besides, in one load case; noise is theirs where no displacement was measured
     """
 
     solid: LoadedSolid
@@ -32,6 +34,7 @@ class DisplacementData:
     d: Array | None
     noise: float = 0.0
     motion: Motion | None = None
+    strains: StrainGauges | None = None
 
     def require_data(self) -> Array:
         """d. Raises InputError for synthetic data that are not computed yet."""
@@ -57,12 +60,19 @@ class DisplacementData:
 
     def reads_nothing(self) -> bool:
         """Whether all probes are at clamped nodes."""
-        bc = self.solid.bc
-        return not (bc.index[:, self.probes.nodes] != bc.n_free).any()
+        bc, strains = self.solid.bc, self.strains
+        nodes = self.probes.nodes if strains is None else np.concatenate([self.probes.nodes, strains.nodes])
+        return not (bc.index[:, nodes] != bc.n_free).any()
 
     def misfit(self, u: Any, p: Any, xp: Any = np) -> Any:
-        d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p, xp), xp)
-        return sum(0.5 * (self._residual(U[case], d[case]) ** 2).sum() for case in range(len(d)))
+        s = self.solid.setup(p, xp)
+        d, U = self.require_data(), self._probe_displacements(u, s, xp)
+        J = sum(0.5 * (self._residual(U[case], d[case]) ** 2).sum() for case in range(len(d)))
+        return J if self.strains is None else J + 0.5 * (self._strain_residual(u, s, xp) ** 2).sum()
+
+    def _strain_residual(self, u: Any, s: Setup, xp: Any = np) -> Any:
+        assert self.strains is not None
+        return self.strains.residual(self.solid.displacements(u, s, 0, self.strains.nodes, xp))
 
     def _residual(self, U: Any, d: Any) -> Any:
         """P w (S u - d), (m,), of one load case."""
@@ -80,9 +90,13 @@ class DisplacementData:
 
     def misfit_gradient(self, u: Array, p: Array) -> tuple[Array, Any]:
         """Derivatives of the misfit with respect to u (n_u,) and the grip displacement."""
-        d, U = self.require_data(), self._probe_displacements(u, self.solid.setup(p))
+        s, bc = self.solid.setup(p), self.solid.bc
+        d, U = self.require_data(), self._probe_displacements(u, s)
         forces = [self.probes.forces(self._residual(U[case], d[case])) for case in range(len(d))]
-        parts = [self.solid.bc.assemble(f, self.probes.nodes, case) for case, f in enumerate(forces)]
+        parts = [bc.assemble(f, self.probes.nodes, case) for case, f in enumerate(forces)]
+        if self.strains is not None:
+            by_u, by_a = bc.assemble(self.strains.forces(self._strain_residual(u, s)), self.strains.nodes, 0)
+            parts = [(parts[0][0] + by_u, parts[0][1] + by_a)]
         return np.concatenate([by_u for by_u, _ in parts]), sum(by_a for _, by_a in parts)
 
     def observation(self, u: Array, p: Array) -> Observation:
@@ -97,7 +111,46 @@ class DisplacementData:
         seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=at, quantity=quantity)
         if self.probes.weights is not None:
             seen = seen.weighted(np.tile(self.probes.weights[measured], len(d)))
-        return seen if self.motion is None else seen.without(self.motion, len(d))
+        if self.strains is not None:
+            seen = self._with_strains(seen, u, p)
+        if self.motion is None:
+            return seen
+        strained = len(seen.data) - len(self.motion.Q) * len(d)
+        return seen.without(self.motion.padded(strained) if strained else self.motion, len(d))
+
+    def _with_strains(self, seen: Observation, u: Array, p: Array) -> Observation:
+        """The rows of strains below those of displacements; one load case."""
+        from scipy import sparse
+
+        gauges, bc = self.strains, self.solid.bc
+        assert gauges is not None
+        w, measured = gauges.weight, gauges.measured
+        S = w * gauges.matrix(bc.index[0], bc.n_free + 2)
+        U = self.solid.displacements(u, self.solid.setup(p), 0, gauges.nodes)
+        S_p = None if seen.S_p is None else np.concatenate([seen.S_p, S[:, [bc.n_free + 1]].toarray()])
+        before = len(seen.data)
+        quantity, x = gauges.quantities, gauges.positions
+        assert seen.position is not None
+        assert seen.quantity is not None
+
+        def label(k: int) -> str:
+            return (
+                seen.label(k)
+                if k < before
+                else f"{quantity[k - before]} at ({', '.join(f'{c:.3g}' for c in x[k - before])})"
+            )
+
+        return replace(
+            seen,
+            predicted=np.concatenate([seen.predicted, w * gauges.read(U)[measured]]),
+            data=np.concatenate([seen.data, w * gauges.e[measured]]),
+            S_u=sparse.vstack([seen.S_u, S[:, : bc.n_free]], format="csr"),
+            S_p=S_p,
+            label=label,
+            relative=np.concatenate([np.broadcast_to(seen.relative, before), np.full(len(quantity), w)]),
+            position=np.concatenate([seen.position, x]),
+            quantity=np.concatenate([seen.quantity, quantity]),
+        )
 
     def candidates(self) -> Candidates:
         """Every free displacement component of every node, in every load case."""

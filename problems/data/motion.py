@@ -43,6 +43,11 @@ class Motion:
         U, s, _ = np.linalg.svd(B / (np.linalg.norm(B, axis=0) + np.finfo(float).tiny), full_matrices=False)
         return cls(B, tuple(names), U[:, s > RANK * s.max()])
 
+    def padded(self, count: int) -> Motion:
+        """With `count` more data, which it does not move."""
+        rows = ((0, count), (0, 0))
+        return Motion(np.pad(self.B, rows), self.names, np.pad(self.Q, rows))
+
     def check(self, d: Array, who: str) -> None:
         """Raises InputError for data (cases, m) that are all motion."""
         left = np.linalg.norm(self.projected(d))

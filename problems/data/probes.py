@@ -9,6 +9,7 @@ import numpy as np
 
 from gradient_routes.problems.data.placing import Outside, place
 from gradient_routes.problems.data.repeats import without_repeats
+from gradient_routes.problems.data.strain_gauges import GROUP, StrainGauges, has_strains, strains_of
 from gradient_routes.problems.data.table import Group, Table, read_table
 from gradient_routes.problems.data.units import doubt
 from gradient_routes.problems.errors import InputError
@@ -80,12 +81,16 @@ def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Pro
 
 @dataclass(frozen=True)
 class Measured:
-    """What a file holds: probes, data d (m, d) [m], noise sigma [m], 0 if unknown, and notes on how it was read."""
+    """What a file holds: probes, data d (m, d) [m], noise sigma [m], 0 if unknown, notes on how it was read, strains.
+
+    sigma is that of the strains [1] where no displacement was measured.
+    """
 
     probes: Probes
     d: Array
     sigma: float
     notes: tuple[str, ...]
+    strains: StrainGauges | None = None
 
 
 def read_probes(
@@ -95,39 +100,63 @@ def read_probes(
     units: str | None = None,
     outside: Outside = "refuse",
     noise: float = 0.0,
+    strain_noise: float = 0.0,
 ) -> Measured:
-    """Read x,y,z and any of ux,uy,uz, of a plane body x,y and ux,uy; an empty cell was not measured.
+    """Read x,y,z and any of ux,uy,uz and of exx,eyy.., of a plane body x,y and ux,uy; an empty cell was not measured.
 
     See `read_table` and `place`. The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y, sigma_z, by
-    which data are then weighted.
+    which data are then weighted; of strains, which weigh by the ratio of both, `strain_noise` [1].
     Raises InputError for a file that cannot be understood, and for points outside the body.
     """
     axes = AXES[: mesh.geometry.dim]
-    table = read_table(path, groups(axes), columns, units)
+    strained = has_strains(path, columns)
+    table = read_table(path, (*groups(axes, "none" if strained else "any"), GROUP), columns, units)
     x, d = table.stack(axes), table.stack([f"u{axis}" for axis in axes])
+    e = strains_of(table, axes) if strained else np.empty((len(x), 0))
     sigma = noise_of(table, axes, d, noise)
-    kept, repeated = without_repeats(path, x, d, table.lines, sigma)
+    both = np.c_[np.broadcast_to(sigma, d.shape), np.full(e.shape, strain_noise)] if strained else sigma
+    kept, repeated = without_repeats(path, x, np.c_[d, e], table.lines, both)
     placed = place(mesh, x[kept], path, outside)
     rows = np.flatnonzero(kept)[placed.rows]
-    d, weights = d[rows], None
+    d, e, weights = d[rows], e[rows], None
     measured = ~np.isnan(d)
-    if not measured.any():
+    if not (measured.any() or (~np.isnan(e)).any()):
         raise InputError(f"{path}: measures nothing - give at least one row with a displacement")
     if isinstance(sigma, np.ndarray):
         level = float(np.mean(sigma[rows][measured] ** -2.0) ** -0.5)
         weights = level / np.where(measured, sigma[rows], level)
         sigma = level
+    doubtful = doubt(sigma, float(np.abs(d[measured]).max())) if measured.any() else ""
+    weight, sigma = _weighed(path, bool(measured.any()), bool((~np.isnan(e)).any()), sigma, strain_noise)
+    strains = StrainGauges.of(mesh.geometry, placed, e, axes, weight)
     probes = Probes(placed.nodes, placed.N, placed.x, measured, weights)
-    doubtful = doubt(sigma, float(np.abs(d[measured]).max(initial=0.0)))
     notes = tuple(filter(None, (table.said, repeated, *placed.said, doubtful)))
-    return Measured(probes, np.where(measured, d, 0.0), sigma, notes)
+    return Measured(probes, np.where(measured, d, 0.0), sigma, notes, strains)
 
 
-def groups(axes: str) -> tuple[Group, Group, Group]:
+def _weighed(path: str, moved: bool, strained: bool, sigma: float, strain_noise: float) -> tuple[float, float]:
+    """The weight of strains in J, and the noise of all data as J weighs them. Raises InputError."""
+    if not strained and strain_noise:
+        raise InputError(f"{path}: strain_noise={strain_noise:g}, but no strain was measured - leave it out")
+    if not strained:
+        return 1.0, sigma
+    if not moved and sigma:
+        raise InputError(f"{path}: noise={sigma:g} is of displacements, and strains alone were measured: strain_noise=")
+    if not moved:
+        return 1.0, strain_noise
+    if not (sigma and strain_noise):
+        raise InputError(
+            f"{path}: displacements and strains in one J are weighed by their noise - state both, as in"
+            " noise=0.4um,strain_noise=20microstrain"
+        )
+    return sigma / strain_noise, sigma
+
+
+def groups(axes: str, need: str = "any") -> tuple[Group, Group, Group]:
     """The columns of coordinates, displacements and their noise."""
     return (
         Group(tuple(axes), "length", marked=False),
-        Group(tuple(f"u{axis}" for axis in axes), "length", need="any", gaps=True),
+        Group(tuple(f"u{axis}" for axis in axes), "length", need=need, gaps=True),
         Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True),
     )
 

@@ -126,7 +126,8 @@ class Solid(Problem):
         if amplitude == 0.0 and o.unknown in MATERIAL:
             self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
         if measured:
-            found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, self.noise)
+            strain_noise = standard_deviation(o.strain_noise, True, self.name, "ratio", "strain_noise")
+            found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, self.noise, strain_noise)
             self.data = self._from_file(found)
             self.read_as = (*found.notes, *self._load_in_words(o.loaded))
             self.notes += self.read_as
@@ -147,7 +148,9 @@ class Solid(Problem):
         greatest, size = float(np.abs(measured.d).max()), self.mesh.diameter
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        return DisplacementData(self.solid, measured.probes, measured.d[None], measured.sigma)
+        if measured.strains is not None and self.solid.design.moved_nodes is not None:
+            raise InputError(f"{self.name}: strains are read in a mesh that stands still, not with unknown=shape")
+        return DisplacementData(self.solid, measured.probes, measured.d[None], measured.sigma, strains=measured.strains)
 
     def _without_file(self, points: probes.Probes) -> DisplacementData:
         """The target displacements; none yet for synthetic data."""
@@ -168,6 +171,8 @@ class Solid(Problem):
     def _with_motion(self, data: DisplacementData, kind: MotionName) -> DisplacementData:
         """With a motion to eliminate. Raises InputError for data that are all motion."""
         at = data.probes
+        if kind != "none" and not at.measured.any():
+            raise InputError(f"{self.name}: motion={kind} is of displacements, and none were measured - leave it out")
         motion = Motion.of(kind, at.x, at.measured, at.weights, self.mesh.geometry.axisymmetric)
         if motion is not None and data.d is not None:
             still = np.zeros((*at.nodes.shape, at.x.shape[1]))

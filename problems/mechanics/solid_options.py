@@ -41,6 +41,7 @@ MotionOf = Annotated[MotionName, "of the camera or the grips, unknown, in the da
 Direction = Annotated[str | None, "of a dead load or a grip: x, -z, 0,0.6,0.8 or normal [the last axis]"]
 Force = Annotated[float | None, "total on the loaded face instead of traction= [N]"]
 Noise = Annotated[float | str | None, "standard deviation of a file's data, added to a twin's [m], or 0.4um"]
+StrainNoise = Annotated[float | str | None, "that of a file's strains exx,eyy,exy.. [1], or 20microstrain"]
 Seed = Annotated[int, "of noise and markers"]
 Alpha = Annotated[float, "weight of Phi"]
 PhiWidth = Annotated[float, "jump of log E below which total variation is rounded"]
@@ -100,6 +101,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("markers", o.markers > 0, True, {"face": o.face != "right", "components": o.components != "all"}),
         ("markers", o.markers > 0, False, {"sensors": o.sensors}),
         ("data=FILE", measured, True, {"columns": o.columns, "units": o.units, "outside": o.outside != "refuse"}),
+        ("data=FILE", measured, True, {"strain_noise": o.strain_noise is not None}),
         ("load=follower", o.load == "follower", False, {"direction": o.direction}),
         ("cases", o.cases > 1, False, {"direction": o.direction}),
         ("load=traction", o.load == "traction", True, {"force": o.force is not None}),
