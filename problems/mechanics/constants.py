@@ -43,14 +43,18 @@ class Constants:
     start: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def parse(cls, text: str, law: MaterialLaw, who: str) -> Constants:
-        """`E,nu` or `E:200GPa,nu:0.3`. Raises InputError for constants that the law has not, and bad starts."""
+    def parse(cls, text: str, law: MaterialLaw, who: str, incompressible: bool = False) -> Constants:
+        """`E,nu` or `E:200GPa,nu:0.3`; of an incompressible material the last constant of the law is none.
+
+        Raises InputError for constants that the law has not, and bad starts.
+        """
         parts = [part.partition(":") for part in text.split(",")]
         names = tuple(name.strip() for name, _, _ in parts)
         also = ALSO.get(law.name, {})
-        pairs = list(PAIRS) if law.constants == ("mu", "lam") else []
-        if names not in pairs and tuple(also.get(name, name) for name in names) != law.constants:
-            own = [] if pairs else [law.constants]
+        constants = law.constants[: len(law.constants) - incompressible]
+        pairs = list(PAIRS) if constants == ("mu", "lam") else []
+        if names not in pairs and tuple(also.get(name, name) for name in names) != constants:
+            own = [] if pairs else [constants]
             known = " or ".join(",".join(one) for one in [*pairs, *own])
             raise InputError(f"{who}: constants={text} - {law.name} has {known}, with starts as in {pairs_of(known)}")
         start = {
@@ -70,7 +74,7 @@ class Constants:
         return self.names in PAIRS
 
     def _check(self, law: MaterialLaw, who: str) -> None:
-        positive = dict(zip(self.names, law.positive, strict=True))
+        positive = dict(zip(self.names, law.positive, strict=False))  # incompressible: without the last
         if self.paired:
             positive = {name: name in ("E", "mu", "K", "G") for name in self.names}
         for name, value in self.start.items():
@@ -82,29 +86,35 @@ class Constants:
         if self.names == ("mu", "lam") and self.start and not self.start["lam"] + 2.0 * self.start["mu"] / 3.0 > 0.0:
             raise InputError(f"{who}: lam + 2 mu/3 = K is not > 0, and the law unstable - choose lam > -2 mu/3")
 
-    def design(self, mesh: Mesh, law: MaterialLaw, nu: float, E: float) -> DesignVariables:
-        """From the starts, else from those of the modulus E and nu."""
-        q = np.array(law.of_modulus(self.start.get("E", E), self.start.get("nu", nu)))
-        if self.names != ("E", "nu") and self.start:
-            q = np.array([self.start[name] for name in self.names])
-            if self.names == ("K", "G"):
-                q = np.array([q[1], q[0] - 2.0 * q[1] / 3.0])
-        plain = constants(mesh, law, nu, E)
+    def parameters(self, q: Array, plain: Parameters) -> Parameters:
+        """From constants q of the law, or the starts; `plain` are those of q as they are."""
+        given = np.array([self.start[name] for name in self.names if name in self.start])
         if not self.paired:
+            q = given if given.size else q
             scale = np.where(q == 0.0, np.abs(q).max(), np.abs(q))
-            parameters = replace(plain.parameters, start=q, scale=scale, label=lambda i: self.names[i])
-            return replace(plain, parameters=parameters, truth=1.3 * q)
-        start = self.of_lame(*q)
+            return replace(plain, start=q, scale=scale, label=lambda i: self.names[i])
+        if self.names == ("K", "G") and given.size:
+            given = np.array([given[1], given[0] - 2.0 * given[1] / 3.0])
         most = np.array([THETA_MAX, LOGIT_MAX if self.names == ("E", "nu") else THETA_MAX])
-        parameters = Parameters(
-            start=start,
+        return Parameters(
+            start=self.of_lame(*(q if self.names == ("E", "nu") or not given.size else given)),
             scale=np.ones(2),
             lower=-most,
             upper=most,
             unit=("log Pa", "1" if self.names == ("E", "nu") else "log Pa"),
             label=lambda i: PAIRS[self.names][i],  # type: ignore[index]
         )
-        by_stiffness = np.array([1.0, 0.0 if self.names == ("E", "nu") else 1.0])
+
+    def small_strain(self, E: float, nu: float) -> tuple[float, float]:
+        """E and nu as given, else these."""
+        return self.start.get("E", E), self.start.get("nu", nu)
+
+    def design(self, mesh: Mesh, law: MaterialLaw, nu: float, E: float) -> DesignVariables:
+        """From the starts, else from those of the modulus E and nu."""
+        plain = constants(mesh, law, nu, E)
+        parameters = self.parameters(np.array(law.of_modulus(*self.small_strain(E, nu))), plain.parameters)
+        if not self.paired:
+            return replace(plain, parameters=parameters, truth=1.3 * parameters.start)
 
         def apply(s: Setup, p: Any, xp: Any) -> Setup:
             return replace(s, q=self.lame(p, xp))
@@ -113,9 +123,9 @@ class Constants:
             plain,
             parameters=parameters,
             apply=apply,
-            truth=start + TRUTH,
+            truth=parameters.start + TRUTH,
             chain=self.by_p,
-            by_stiffness=by_stiffness,
+            by_stiffness=np.array([1.0, 0.0 if self.names == ("E", "nu") else 1.0]),
         )
 
     def of_lame(self, mu: float, lam: float) -> Array:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gradient_routes.problems.coupon import Coupon
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.materials import LAWS, lame
 from gradient_routes.problems.plate import Plate
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.synthetic_data import with_synthetic_data
 
 CHOICES = ("E,nu", "mu,lam", "K,G")
 LINEAR = LAWS["linear"]
@@ -80,3 +82,19 @@ def test_what_is_refused(options: dict, says: str) -> None:
     with pytest.raises(InputError) as refused:
         Plate(**{"n": 1, "unknown": "constants"} | options)
     assert says in str(refused.value)
+
+
+def test_constants_of_curves_are_exact_and_named_as_the_user_does() -> None:
+    coupon = Coupon(volume="compressible", constants="E:2MPa,nu:0.4", mode="uniaxial+shear", points=3)
+    coupon = with_synthetic_data(coupon)
+    p = coupon.parameters.start
+    assert coupon.stated(p) == pytest.approx({"E [Pa]": 2e6, "nu": 0.4})
+    assert Constants.parse("E,nu", LINEAR, "coupon").lame(p) == pytest.approx(lame(2e6, 0.4))
+    u = Model(coupon).solve(p).u
+    (S, R), e = (coupon.stresses(u, p + 1e-30j * np.eye(2)[1])), np.eye(2)[1]
+    np.testing.assert_allclose(coupon.linearize(u, p).R_p @ e, R.imag / 1e-30, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(coupon.observation(u, p).S_p @ e, S.imag / 1e-30, rtol=1e-12, atol=1e-9)
+    rubber = Coupon(law="mooney-rivlin", constants="C10:0.2MPa,C01:0.1MPa")
+    assert rubber.parameters.start == pytest.approx([2e5, 1e5])
+    with pytest.raises(InputError, match="neo-hookean has mu, with starts as in mu:1MPa"):
+        Coupon(constants="E,nu")
