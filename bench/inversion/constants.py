@@ -27,6 +27,7 @@ class Constants:
     thirds  what each third of the data along their longest extent says alone, by name. They differ by what the model
             leaves out, which error bars do not know.
     bounds  by name, of those at an end of their domain
+    shown   whether they are no parameters, which have a table of their own
     """
 
     names: tuple[str, ...]

@@ -250,7 +250,7 @@ def invert(
         stop,
         ending,
         interrupted,
-        variables.warning(None if seen is None else seen.data),
+        variables.warning(None if seen is None or seen.sigma else seen.data),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
         None if interrupted else fit(problem, last, engine.solver),
         None if interrupted else at_rest(problem, last, engine.solver),
