@@ -27,19 +27,8 @@ class Noise:
     source: str
 
 
-def estimated(r: Array, position: Array, quantity: Array, share: float) -> Noise | None:
-    """Of residuals r (m,) at position (m, d) of a quantity (m,), of which `share` is left by a fit; None if too few."""
-    found = repeated(r, position, quantity)
-    if found is not None:
-        return found
-    compared = np.concatenate([_unshared(r[at], position[at]) for at in map(quantity.__eq__, np.unique(quantity))])
-    if len(compared) < LEAST:
-        return None
-    return Noise(NORMAL * float(np.median(np.abs(compared))) / np.sqrt(share), "neighbouring points")
-
-
 def repeated(r: Array, position: Array, quantity: Array) -> Noise | None:
-    """From values of one place; None where there are too few."""
+    """From residuals r (m,) of one place, position (m, d), and quantity (m,); None where there are too few."""
     number = np.unique(quantity, return_inverse=True)[1]
     _, place, count = np.unique(np.c_[number, position], axis=0, return_inverse=True, return_counts=True)
     freedom = len(r) - len(count)
@@ -48,6 +37,17 @@ def repeated(r: Array, position: Array, quantity: Array) -> Noise | None:
     place = place.ravel()
     off = r - (np.bincount(place, r) / count)[place]
     return Noise(float(np.sqrt(off @ off / freedom)), "repeated points")
+
+
+def of_neighbours(r: Array, position: Array, quantity: Array, share: float) -> Noise | None:
+    """Of residuals r (m,) at position (m, d) of a quantity (m,), of which `share` is left by a fit; None if too few.
+
+    Where residuals are not correlated, their own root mean square tells more.
+    """
+    compared = np.concatenate([_unshared(r[at], position[at]) for at in map(quantity.__eq__, np.unique(quantity))])
+    if len(compared) < LEAST:
+        return None
+    return Noise(NORMAL * float(np.median(np.abs(compared))) / np.sqrt(share), "neighbouring points")
 
 
 def _unshared(r: Array, x: Array) -> Array:

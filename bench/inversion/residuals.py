@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gradient_routes.bench.inversion.local_noise import NORMAL, Noise, estimated
+from gradient_routes.bench.inversion.local_noise import NORMAL, Noise, of_neighbours, repeated
 from gradient_routes.bench.inversion.moran import Moran
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.problem import Array
@@ -70,7 +70,9 @@ class Residuals:
             quantity = np.full(len(r), "") if seen.quantity is None else seen.quantity
             basis = modes if H is None else np.concatenate([H, modes], axis=1)
             moran = Moran.of(inner, x[kept], quantity[kept], basis[kept])
-            told = None if sigma else estimated(inner, x[kept], quantity[kept], freedom / len(inner))
+            told = None if sigma else repeated(inner, x[kept], quantity[kept])
+            if not sigma and told is None and moran is not None and moran.correlated:
+                told = of_neighbours(inner, x[kept], quantity[kept], freedom / len(inner))
         if not sigma and freedom >= 1.0 and (told is None or told.sigma > inner_rms):
             told = Noise(inner_rms, "the residuals themselves")
         outliers = len(r) - len(inner)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gradient_routes.bench.inversion.local_noise import estimated
+from gradient_routes.bench.inversion.local_noise import of_neighbours, repeated
 from gradient_routes.bench.inversion.moran import Moran, neighbours
 from gradient_routes.bench.inversion.residuals import Residuals
 from gradient_routes.problems.data.observation import Observation
@@ -98,19 +98,20 @@ def test_a_prior_may_correlate_residuals_and_is_named() -> None:
 
 
 def test_noise_of_smooth_data_is_what_neighbours_do_not_share() -> None:
-    """Linear data have none; repeated ones tell it first, and alike."""
+    """Linear data have none; repeated ones tell it alike."""
     g = np.random.default_rng(3)
     x = np.repeat(g.random((200, 2)), 2, axis=0)
     smooth, quantity = np.sin(2.0 * x[:, 0]) + x[:, 1], np.zeros(400)
-    found = estimated(smooth + 1e-3 * g.standard_normal(400), x, quantity, 1.0)
+    found = repeated(smooth + 1e-3 * g.standard_normal(400), x, quantity)
     assert found is not None
     assert found.source == "repeated points"
+    assert repeated(smooth[::2], x[::2], quantity[::2]) is None
     assert found.sigma == pytest.approx(1e-3, rel=0.15)
-    each = estimated(smooth[::2] + 1e-2 * g.standard_normal(200), x[::2], quantity[::2], 1.0)
+    each = of_neighbours(smooth[::2] + 1e-2 * g.standard_normal(200), x[::2], quantity[::2], 1.0)
     assert each is not None
     assert each.source == "neighbouring points"
     assert each.sigma == pytest.approx(1e-2, rel=0.25)
-    linear = estimated(3.0 * x[::2, 0] - x[::2, 1], x[::2], quantity[::2], 1.0)
+    linear = of_neighbours(3.0 * x[::2, 0] - x[::2, 1], x[::2], quantity[::2], 1.0)
     assert linear is not None
     assert linear.sigma < 1e-12
-    assert estimated(g.standard_normal(9), x[:18:2], quantity[:9], 1.0) is None
+    assert of_neighbours(g.standard_normal(9), x[:18:2], quantity[:9], 1.0) is None
