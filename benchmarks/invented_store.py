@@ -184,7 +184,7 @@ def kink(problem: str, n: int, rng: np.random.Generator) -> Tables:
 
 
 def inversion(problem: str, n: int, rng: np.random.Generator) -> Tables:
-    histories, found = [], []
+    histories, found, constants, fits, missed = [], [], [], [], []
     for route, optimizer, rate in (
         ("adjoint", "lbfgs", 0.5),
         ("adjoint", "descent", 0.9),
@@ -207,8 +207,16 @@ def inversion(problem: str, n: int, rng: np.random.Generator) -> Tables:
                 "estimate": truth[i] * (1 + 0.02 * rng.standard_normal()) if seen else 1.0,
             }
             found.append(what | {"parameter": f"E_{i + 1}", "x": (i + 0.5) / n, "blind": int(not seen)} | values)
+        for i in range(n):
+            off = {"residual": 1e-3 * rng.standard_normal(), "standardized": rng.standard_normal(), "outlier": 0}
+            missed.append(what | {"datum": f"u_{i + 1}", "x": (i + 0.5) / n, "measured": 1.0} | off)
+        noise = {"noise": 1e-3, "noise_source": "stated", "chi2": 1.0, "moran": 0.1, "moran_z": 0.9}
+        sure = {"sd": 0.01, "third_1": 0.9, "third_2": 1.0, "third_3": 1.1, "correlations": {"E": 1.0}}
+        constants.append(what | {"constant": "E", "value": 1.0} | sure)
+        fits.append(what | noise | {"data": n, "outliers": 0, "freedom": n - 2.0, "rms": 1e-3, "verdict": "explained"})
     found += block(n)
-    return {"inversion": histories, "estimates": found}
+    told = {"constants": constants, "fit": fits, "residuals": missed}
+    return {"inversion": histories, "estimates": found} | told
 
 
 def block(n: int) -> list[Row]:

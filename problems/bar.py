@@ -262,7 +262,8 @@ class Bar(Problem):
 
     def observation(self, u: Array, p: Array) -> Observation:
         at, d, nodes = self.sensors.nodes - 1, self.sensors.d, self.sensors.nodes
-        return Observation(u[at], d, selection(at, self.n_state), sigma=self.noise, label=lambda k: f"u_{nodes[k]}")
+        S_u, x = selection(at, self.n_state), (nodes * self.L_e)[:, None]
+        return Observation(u[at], d, S_u, sigma=self.noise, label=lambda k: f"u_{nodes[k]}", position=x)
 
     def candidates(self) -> Candidates:
         """The displacement of every node, without the contact force."""

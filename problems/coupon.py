@@ -9,7 +9,7 @@ F = diag(lambda, ..) of each datum by its mode, see `mechanics/homogeneous.py`. 
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -21,9 +21,11 @@ from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
+from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.homogeneous import MODES, States
 from gradient_routes.problems.problem import (
     Array,
+    End,
     Linearization,
     Offers,
     Parameters,
@@ -58,6 +60,9 @@ class Coupon(Problem):
         volume: Annotated[Literal["incompressible", "compressible"], "whether it may change"] = "incompressible",
         modulus: Annotated[float | None, "E of the start [Pa] [1; fitted to a file]"] = None,
         nu: Annotated[float, "of the start, of a compressible material"] = 0.45,
+        constants: Annotated[
+            str | None, "that are unknown: C10,C01 .., compressible E,nu mu,lam K,G; with starts as in C10:0.2MPa"
+        ] = None,
         stretch: Annotated[float, "last one of synthetic curves, from 1"] = 2.0,
         points: Annotated[int, "of a synthetic curve"] = 8,
         data: Annotated[str | None, "file of columns stretch,stress, and mode if several [synthetic]"] = None,
@@ -80,6 +85,7 @@ class Coupon(Problem):
             ("data=FILE", data is not None, True, {"columns": columns, "units": units}),
             ("data=FILE", data is not None, False, {"stretch": stretch != 2.0, "points": points != 8}),
             ("volume=compressible", not self.incompressible, True, {"nu": nu != 0.45}),
+            ("starts in constants", ":" in (constants or ""), False, {"modulus": modulus is not None}),
         )
         self.noise, self.seed = standard_deviation(noise, data is not None, "coupon", "stress"), seed
         self.d: Array | None = None
@@ -98,11 +104,15 @@ class Coupon(Problem):
         self.structure = "spd" if self.incompressible else "symmetric"
         self.offset = 0.0 if self.incompressible else 1.0
         self.pattern = SymmetricPattern.of_elements(np.arange(self.n_state)[:, None], self.n_state)
-        E = self._fitted() if modulus is None and data is not None else 1.0 if modulus is None else modulus
+        stated = None if constants is None else Constants.parse(constants, LAWS[law], "coupon", self.incompressible)
+        self.constants = stated
+        fitted = modulus is None and data is not None and not (stated and {*stated.start} - {"nu"})
+        E = self._fitted() if fitted else 1.0 if modulus is None else modulus
         if not 1e-30 <= E <= 1e30:
             raise InputError(f"coupon: modulus={E:g} Pa - choose one from 1e-30 to 1e30")
-        if data is not None:
+        if data is not None and (fitted or modulus is not None):
             self.read_as = (*self.read_as, f"start: a modulus of {E:.4g} Pa")
+        E, nu = (E, nu) if stated is None else stated.small_strain(E, nu)
         of_shear = 2.0 * (1.0 + nu) / 3.0 if self.incompressible else 1.0  # mu = E/3
         q = np.array(self.law.of_modulus(of_shear * E, nu))
         self.law.check(tuple(q))
@@ -115,7 +125,9 @@ class Coupon(Problem):
             unit="Pa",
             label=self.law.constants.__getitem__,
         )
-        self.regularization = Prior(alpha, "amplitude", origin=start, scale=np.abs(start))
+        if stated is not None:
+            self.parameters = stated.parameters(start, self.parameters)
+        self.regularization = Prior(alpha, "amplitude", origin=self.parameters.start, scale=self.parameters.scale)
         self.regularization.check("coupon")
         same = law == "mooney-rivlin" and self.incompressible and {*self.modes} == {"shear"}
         blind = ("curves of shear alone tell c1 + c2, neither of them: I1 = I2 - add another mode",) if same else ()
@@ -144,9 +156,17 @@ class Coupon(Problem):
         """B (m, 2, n_p), P_11 and P_33 by p."""
         return xp.asarray(self._isochoric_basis if self.incompressible else self.stress.basis(self.states.strains(u)))
 
+    def _q(self, p: Any, xp: Any = np) -> Any:
+        """Constants of the law (n_p,)."""
+        return xp.stack(self.constants.lame(p, xp)) if self.constants and self.constants.paired else p
+
+    def _by_p(self, B: Array, p: Array) -> Array:
+        """B (m, n_p) by constants of the law, by p."""
+        return B @ self.constants.by_p(p) if self.constants and self.constants.paired else B
+
     def stresses(self, u: Any, p: Any, xp: Any = np) -> tuple[Any, Any]:
         """The nominal stress of every datum and R, both (m,) [Pa]."""
-        P = self._basis(u, xp) @ p
+        P = self._basis(u, xp) @ self._q(p, xp)
         if not self.incompressible:
             return P[:, 0], P[:, 1]
         return P[:, 0] - u / self.states.stretch, u - (1.0 + self.states.isochoric) * P[:, 1]
@@ -164,7 +184,7 @@ class Coupon(Problem):
 
     def _by_u(self, u: Array, p: Array) -> Array:
         """dP_11/du and dP_33/du, (m, 2)."""
-        return np.asarray(self.stress.along(self.states.strains(u), self.states.thinned) @ p)
+        return np.asarray(self.stress.along(self.states.strains(u), self.states.thinned) @ self._q(p))
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 |P_11 - d|^2 + alpha Phi [Pa2]."""
@@ -182,16 +202,16 @@ class Coupon(Problem):
         B = self._basis(u)
         if self.incompressible:
             return (-1.0 / self.states.stretch, B[:, 0]), -(1.0 + self.states.isochoric)[:, None] * B[:, 1]
-        return (self._by_u(u, p)[:, 0], B[:, 0]), B[:, 1]
+        return (self._by_u(u, p)[:, 0], self._by_p(B[:, 0], p)), self._by_p(B[:, 1], p)
 
     def observation(self, u: Array, p: Array) -> Observation:
         from scipy import sparse
 
         (S_u, S_p), _ = self._sensing(u, p)
         label = [f"{mode} {lam:.4g}" for mode, lam in zip(self.modes, self.states.stretch, strict=True)]
-        return Observation(
-            self.stresses(u, p)[0], self._data(), sparse.diags_array(S_u).tocsr(), S_p, self.noise, label.__getitem__
-        )
+        at, mode, by_u = self.states.stretch[:, None], np.array(self.modes), sparse.diags_array(S_u).tocsr()
+        S, name = self.stresses(u, p)[0], label.__getitem__
+        return Observation(S, self._data(), by_u, S_p, self.noise, name, position=at, quantity=mode)
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         return self.regularization, p, np.ones_like(p)
@@ -212,7 +232,16 @@ class Coupon(Problem):
         return self.d
 
     def truth(self) -> Array | None:
-        return self.parameters.start * TRUE[: self.n_param] if self.synthetic else None
+        if not self.synthetic:
+            return None
+        paired = self.constants is not None and self.constants.paired
+        return self.parameters.start + 0.2 if paired else self.parameters.start * TRUE[: self.n_param]
+
+    def stated(self, p: Array) -> Mapping[str, Any]:
+        return self.constants.stated(p) if self.constants and self.constants.paired else {}
+
+    def ends(self, p: Array) -> list[End]:
+        return self.constants.ends(p) if self.constants and self.constants.paired else []
 
     def twin(self) -> Coupon | None:
         return self._with_data(np.zeros(self.n_state)) if self.d is None else None

@@ -67,6 +67,7 @@ class Plate(Solid):
         modulus: options.Modulus = None,
         derivatives: options.Derivatives = None,
         unknown: Annotated[PlaneDesign, "what p is"] = "modulus",
+        constants: options.Constants = None,
         parametrization: Annotated[
             Literal["log", "raw"] | None, "of moduli and thickness: p = log E or E [log]"
         ] = None,
@@ -85,12 +86,15 @@ class Plate(Solid):
         markers: options.MarkerCount = 0,
         face: Annotated[str, "edge that carries the markers"] = "right",
         components: options.Components = "all",
-        data: Annotated[str | None, "file with columns x,y,ux,uy; twin: of a stiff inclusion [the target]"] = None,
+        data: Annotated[
+            str | None, "file with columns x,y,ux,uy, or strains exx,eyy,exy; twin: of a stiff inclusion [the target]"
+        ] = None,
         columns: options.Columns = None,
         units: options.Units = None,
         outside: options.OutsideOf = "refuse",
         motion: options.MotionOf = "none",
         noise: options.Noise = None,
+        strain_noise: options.StrainNoise = None,
         seed: options.Seed = 0,
         alpha: options.Alpha = 0.0,
         phi: Annotated[Phi | None, "1/2 |D log E|^2 or total variation; amplitude: 1/2 |p - p_0|^2"] = None,

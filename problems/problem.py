@@ -209,6 +209,17 @@ class Reference:
     size: float
 
 
+@dataclass(frozen=True)
+class End:
+    """A constant at its bound, where p_i has gone far up, or down, and which others go with it."""
+
+    i: int
+    name: str
+    bound: str
+    up: bool
+    others: tuple[str, ...] = ()
+
+
 class Problem:
     """Base of all problems. Set the attributes, override the methods that `offers` promises.
 
@@ -332,6 +343,10 @@ class Problem:
     def stated(self, p: Array) -> Mapping[str, Any]:
         """What p means in constants that people state, such as E and nu, by name with the unit; holomorphic."""
         return {}
+
+    def ends(self, p: Array) -> list[End]:
+        """What p states that is at an end of its domain."""
+        return []
 
     def candidates(self) -> Candidates | None:
         """What sensors can read; None: any unknown of the state."""

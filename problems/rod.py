@@ -82,7 +82,7 @@ class Rod(Problem):
         phi: Annotated[FieldPhi, "1/2 |D log h|^2, D between neighbouring parts, or total variation"] = "tikhonov",
         phi_width: Annotated[float, "jump of log h below which total variation is rounded"] = PHI_WIDTH,
     ) -> None:
-        self._given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
+        self._given = {key: option for key, option in locals().items() if key not in ("self", "__class__")}
         check_applies(
             "rod",
             ("data=FILE", data is not None, True, {"columns": columns, "units": units}),
@@ -201,7 +201,8 @@ class Rod(Problem):
     def observation(self, u: Array, p: Array) -> Observation:
         x, S = self.sensors.x, self.sensors.matrix()[:, self.free]
         predicted = self.sensors.read(self.excess(u))
-        return Observation(predicted, self._data(), S, sigma=self.noise, label=lambda k: f"T at {x[k]:.3g}")
+        label, at = (lambda k: f"T at {x[k]:.3g}"), x[:, None]
+        return Observation(predicted, self._data(), S, sigma=self.noise, label=label, position=at)
 
     def candidates(self) -> Candidates:
         """The temperature of every free node."""

@@ -63,3 +63,40 @@ TRADEOFF = (
     Column("variance", "REAL", "1", "mean |p - mean p|^2 / n_p"),
     Column("total", "REAL", "1", "their sum: mean |p - p_true|^2 / n_p"),
 )
+
+FIT = (
+    *RUN,
+    Column("data", "INTEGER", "1", "how many were measured"),
+    Column("outliers", "INTEGER", "1", "of them, residuals beyond 5 standard deviations"),
+    Column("freedom", "REAL", "1", "data without outliers, less what was fitted to them"),
+    Column("rms", "REAL", "the data's", "root mean square of residuals, per degree of freedom, without outliers"),
+    Column("noise", "REAL", "the data's", "standard deviation of the noise"),
+    Column("noise_source", "TEXT", "", "stated, or what it was estimated from"),
+    Column("chi2", "REAL", "1", "(rms / noise)^2"),
+    Column("moran", "REAL", "1", "Moran's I of residuals: 0 without correlation in space, 1 where neighbours agree"),
+    Column("moran_z", "REAL", "1", "standard deviations of it above chance"),
+    Column("verdict", "TEXT", "", "explained, or why the model does not explain the data"),
+)
+
+CONSTANTS = (
+    *RUN,
+    Column("constant", "TEXT", "", "as people state it, with its unit, or a parameter"),
+    Column("value", "REAL", "its own", "at the end"),
+    Column("sd", "REAL", "its own", "its standard deviation by the noise; none where data do not see it"),
+    Column("third_1", "REAL", "its own", "what the first third of the data along their longest extent says alone"),
+    Column("third_2", "REAL", "its own", "the second"),
+    Column("third_3", "REAL", "its own", "the last"),
+    Column("bound", "TEXT", "", "of its domain, where it has gone there"),
+    Column("correlations", "TEXT", "1", "with the others, by name", json=True),
+)
+
+RESIDUALS = (
+    *RUN,
+    Column("datum", "TEXT", "", "its name"),
+    Column("quantity", "TEXT", "", "what it is: ux, uy, a mode of loading"),
+    *PLACE,
+    Column("measured", "REAL", "its own", "d"),
+    Column("residual", "REAL", "its own", "S u - d at the end, without the motion that is eliminated"),
+    Column("standardized", "REAL", "1", "residual / noise"),
+    Column("outlier", "INTEGER", "1", "1 where it is beyond 5 standard deviations"),
+)

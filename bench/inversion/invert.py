@@ -15,6 +15,7 @@ import numpy as np
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec, point
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.execution.references import norm2
+from gradient_routes.bench.inversion import fit_rows
 from gradient_routes.bench.inversion.columns import RUN
 from gradient_routes.bench.inversion.confirmation import confirmed
 from gradient_routes.bench.inversion.diagnosis import MISLED
@@ -132,13 +133,18 @@ class Inversion:
 
     @property
     def tables(self) -> dict[str, list[Row]]:
-        """Tidy: one row an iterate, one a parameter."""
+        """Tidy: one row an iterate, one a parameter; where data were measured one of the fit, and one a datum."""
         last = len(self.iterates) - 1
         rows = [self.shared | asdict(iterate) | {"ending_solves": None} for iterate in self.iterates]
         rows[last]["ending_solves"] = self.ending_solves
-        doubt = self.fit.residuals.described if self.fit is not None and self.unexplained else None
+        doubt = self.fit.residuals.described.replace("\n", "; ") if self.fit is not None and self.unexplained else None
         rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end, self.linear_regime, doubt)))
-        return {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
+        found = {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
+        if self.fit is None:
+            return found
+        each = [self.shared | row for row in fit_rows.of_each(self.fit)]
+        said = [self.shared | row for row in fit_rows.of_constants(self.fit)]
+        return found | {"constants": said, "fit": [self.shared | fit_rows.of_all(self.fit)], "residuals": each}
 
     def _estimate(self, i: int) -> Row:
         q = self.made.parameters
@@ -244,7 +250,7 @@ def invert(
         stop,
         ending,
         interrupted,
-        variables.warning(None if seen is None else seen.data),
+        variables.warning(None if seen is None or seen.sigma else seen.data),
         f"{variables.described}; J in units of {objective.J_0:.4g}, that of the start",
         None if interrupted else fit(problem, last, engine.solver),
         None if interrupted else at_rest(problem, last, engine.solver),

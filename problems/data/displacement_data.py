@@ -12,7 +12,9 @@ from gradient_routes.problems.data.force_data import ForceData
 from gradient_routes.problems.data.motion import Motion, MotionName, check
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.probes import Probes
+from gradient_routes.problems.data.strain_gauges import StrainGauges
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.fem.mesh import AXES
 from gradient_routes.problems.mechanics.design_variables import Setup
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.problem import Array
@@ -27,6 +29,7 @@ class DisplacementData:
     d (m, d)  [m], None for synthetic data that are not computed yet
     motions   what is eliminated from J
     noise     standard deviation of the noise on d [m]
+    strains   measured besides, in one load case; noise is theirs where no displacement was measured
     force     what is measured of forces besides
     """
 
@@ -35,6 +38,7 @@ class DisplacementData:
     d: tuple[Array, ...] | None
     noise: float = 0.0
     motions: tuple[Motion, ...] | None = None
+    strains: StrainGauges | None = None
     force: ForceData | None = None
 
     def with_motion(self, kind: MotionName) -> DisplacementData:
@@ -42,6 +46,8 @@ class DisplacementData:
         turns, who = self.solid.mesh.geometry.axisymmetric, self.solid.mesh.who
         if kind == "none":
             return self
+        if not any(at.measured.any() for at in self.probes):
+            raise InputError(f"{who}: motion={kind} is of displacements, and none were measured - leave it out")
         motions = tuple(Motion.of(kind, at.x, at.measured, at.weights, turns) for at in self.probes)
         if self.d is not None:
             check(
@@ -77,12 +83,21 @@ class DisplacementData:
 
     def reads_nothing(self) -> bool:
         """Whether all probes are at clamped nodes."""
-        bc = self.solid.bc
-        return not any((bc.index[case][at.nodes] != bc.n_free).any() for case, at in enumerate(self.probes))
+        bc, strains = self.solid.bc, self.strains
+        gauges = [] if strains is None else [(bc.index[0][strains.nodes] != bc.n_free).any()]
+        return not any(
+            (*((bc.index[case][at.nodes] != bc.n_free).any() for case, at in enumerate(self.probes)), *gauges)
+        )
 
     def misfit(self, u: Any, p: Any, xp: Any = np) -> Any:
-        of_forces = [] if self.force is None else self.force.residuals(u, p, xp)
-        return sum(0.5 * (r**2).sum() for r in (*self._residuals(u, p, xp), *of_forces))
+        besides = [] if self.force is None else self.force.residuals(u, p, xp)
+        if self.strains is not None:
+            besides.append(self._strain_residual(u, self.solid.setup(p, xp), xp))
+        return sum(0.5 * (r**2).sum() for r in (*self._residuals(u, p, xp), *besides))
+
+    def _strain_residual(self, u: Any, s: Setup, xp: Any = np) -> Any:
+        assert self.strains is not None
+        return self.strains.residual(self.solid.displacements(u, s, 0, self.strains.nodes, xp))
 
     def _residuals(self, u: Any, p: Any, xp: Any = np) -> list[Any]:
         """P w (S u - d), (m,), of every load case."""
@@ -103,10 +118,15 @@ class DisplacementData:
 
     def misfit_gradient(self, u: Array, p: Array) -> tuple[Array, Array]:
         """Derivatives of the misfit with respect to u (n_u,) and p (n_p,)."""
+        bc = self.solid.bc
         parts = [
-            self.solid.bc.assemble(at.forces(r), at.nodes, case)
+            bc.assemble(at.forces(r), at.nodes, case)
             for case, (at, r) in enumerate(zip(self.probes, self._residuals(u, p), strict=True))
         ]
+        if self.strains is not None:
+            r = self._strain_residual(u, self.solid.setup(p))
+            more = bc.assemble(self.strains.forces(r), self.strains.nodes, 0)
+            parts = [(parts[0][0] + more[0], parts[0][1] + more[1])]
         by_u = np.concatenate([of_case for of_case, _ in parts])
         by_p = np.zeros_like(p)
         if self.solid.grip_is_parameter:
@@ -123,13 +143,53 @@ class DisplacementData:
         data = np.concatenate([d[case][at.measured] for case, at in enumerate(self.probes)])
         S_p = np.pad(S_a, ((0, 0), (0, len(p) - 1))) if self.solid.grip_is_parameter else None
         position = np.concatenate([at.x[np.nonzero(at.measured)[0]] for at in self.probes])
-        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=position)
+        quantity = np.concatenate([self._quantities(case) for case in range(len(self.probes))])
+        seen = Observation(predicted, data, S_u, S_p, self.noise, self._label, position=position, quantity=quantity)
         if self.probes[0].weights is not None:
             weights = [at.weights[at.measured] for at in self.probes if at.weights is not None]
             seen = seen.weighted(np.concatenate(weights))
+        if self.strains is not None:
+            seen = self._with_strains(seen, u, p)
         if self.force is not None:
             seen = self.force.beside(seen, u, p)
         return seen if self.motions is None else seen.without(self.motions)
+
+    def _with_strains(self, seen: Observation, u: Array, p: Array) -> Observation:
+        """The rows of strains below those of displacements; one load case."""
+        from scipy import sparse
+
+        gauges, bc = self.strains, self.solid.bc
+        assert gauges is not None
+        w, measured = gauges.weight, gauges.measured
+        S = w * gauges.matrix(bc.index[0], bc.size)
+        U = self.solid.displacements(u, self.solid.setup(p), 0, gauges.nodes)
+        S_p = None
+        if seen.S_p is not None:
+            by_a = S[:, bc.grip] @ bc.directions[0][:, None]
+            S_p = np.concatenate([seen.S_p, np.pad(by_a, ((0, 0), (0, len(p) - 1)))])
+        before = len(seen.data)
+        quantity, x = gauges.quantities, gauges.positions
+        assert seen.position is not None
+        assert seen.quantity is not None
+
+        def label(k: int) -> str:
+            return (
+                seen.label(k)
+                if k < before
+                else f"{quantity[k - before]} at ({', '.join(f'{c:.3g}' for c in x[k - before])})"
+            )
+
+        return replace(
+            seen,
+            predicted=np.concatenate([seen.predicted, w * gauges.read(U)[measured]]),
+            data=np.concatenate([seen.data, w * gauges.e[measured]]),
+            S_u=sparse.vstack([seen.S_u, S[:, : bc.n_free]], format="csr"),
+            S_p=S_p,
+            label=label,
+            relative=np.concatenate([np.broadcast_to(seen.relative, before), np.full(len(quantity), w)]),
+            position=np.concatenate([seen.position, x]),
+            quantity=np.concatenate([seen.quantity, quantity]),
+        )
 
     def candidates(self) -> Candidates:
         """Every free displacement component of every node, in every load case."""
@@ -174,6 +234,12 @@ class DisplacementData:
         i = k - self._starts[case]
         return self._name(int(components[i]), probes.x[points[i]], case)
 
+    def _quantities(self, case: int) -> Array:
+        names = [f"u{axis}{self._of_case(case)}" for axis in AXES[: self.probes[case].x.shape[1]]]
+        return np.array(names)[np.nonzero(self.probes[case].measured)[1]]
+
+    def _of_case(self, case: int) -> str:
+        return f", case {case + 1}" if len(self.probes) > 1 else ""
+
     def _name(self, component: int, x: Array, case: int) -> str:
-        which = f", case {case + 1}" if len(self.probes) > 1 else ""
-        return f"u_{'xyz'[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){which}"
+        return f"u_{AXES[component]} at ({', '.join(f'{x_i:.3g}' for x_i in x)}){self._of_case(case)}"

@@ -65,6 +65,9 @@ class ForceData:
             relative=np.concatenate([np.broadcast_to(seen.relative, m), np.full(len(data), self.weight)]),
             label=lambda k: seen.label(k) if k < m else self._label(k - m),
             position=np.concatenate([seen.position, nowhere]),
+            quantity=None
+            if seen.quantity is None
+            else np.append(seen.quantity, [self._label(k) for k in range(len(data))]),
         )
 
     def _label(self, k: int) -> str:

@@ -25,7 +25,8 @@ class Observation:
     weight             factor contained in predicted, data, S_u and sigma
     relative           weights of the data, relative to their mean accuracy, contained in them as well
     whole              all of this before `modes` (m, k) were eliminated, where there are any
-    position (m, d)    of each datum [m], or None
+    position (m, d)    of each datum [m], or what else tells which are neighbours, or None
+    quantity (m,)      what each of them is, in a word: only data of one quantity are neighbours; None: all are of one
     """
 
     predicted: Array
@@ -39,6 +40,7 @@ class Observation:
     whole: Observation | None = None
     modes: Array | None = None
     position: Array | None = None
+    quantity: Array | None = None
 
     def weighted(self, w: Array) -> Observation:
         """With factors w (m,), by which J weights the data; those of equal accuracy have one sigma then."""

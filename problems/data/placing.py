@@ -24,11 +24,14 @@ FACTORS = {
 
 @dataclass(frozen=True)
 class Placed:
-    """rows (m,) that are kept, points x (m, d) [m], nodes (m, k) of their cells, shape functions N (m, k), notes."""
+    """rows (m,) that are kept, points x (m, d) [m], nodes (m, k) of their cells, coordinates xi (m, d) in these, shape
+    functions N (m, k), notes.
+    """
 
     rows: Array
     x: Array
     nodes: Array
+    xi: Array
     N: Array
     said: tuple[str, ...]
 
@@ -55,7 +58,7 @@ def place(mesh: Mesh, x: Array, path: str | Path, outside: Outside = "refuse") -
     nodes = geometry.nodes[cells]
     if moved.any():
         x[moved] = np.einsum("ka,kai->ki", N[moved], geometry.X[nodes[moved]])
-    return Placed(rows, x, nodes, N, tuple(said))
+    return Placed(rows, x, nodes, xi, N, tuple(said))
 
 
 def _likely_unit(mesh: Mesh, x: Array) -> str | None:

@@ -11,6 +11,7 @@ from gradient_routes.problems.data.boundary_values import BoundaryValues
 from gradient_routes.problems.data.load_cases import CASE, LOAD, LoadCases
 from gradient_routes.problems.data.placing import Outside, place
 from gradient_routes.problems.data.repeats import without_repeats
+from gradient_routes.problems.data.strain_gauges import GROUP, StrainGauges, has_strains, strains_of
 from gradient_routes.problems.data.table import Group, Table, read_table
 from gradient_routes.problems.data.units import doubt
 from gradient_routes.problems.errors import InputError
@@ -90,8 +91,10 @@ def markers(mesh: Mesh, face: str, count: int, in_plane: bool, seed: int) -> Pro
 @dataclass(frozen=True)
 class Measured:
     """What a file holds: for each load case probes and data d (m, d) [m]; noise sigma [m], 0 if unknown; the loads of
-    its cases, where it names any; displacements of a measured boundary in every case, or none; and notes on how it was
-    read.
+    its cases, where it names any; displacements of a measured boundary in every case, or none; notes on how it was
+    read; and strains, in one load case.
+
+    sigma is that of the strains [1] where no displacement was measured.
     """
 
     probes: tuple[Probes, ...]
@@ -100,6 +103,7 @@ class Measured:
     loads: LoadCases | None
     boundary: tuple[BoundaryValues, ...]
     notes: tuple[str, ...]
+    strains: StrainGauges | None = None
 
 
 def read_probes(
@@ -110,23 +114,30 @@ def read_probes(
     outside: Outside = "refuse",
     noise: float = 0.0,
     boundary: Array = NOWHERE,
+    strain_noise: float = 0.0,
 ) -> Measured:
-    """Read x,y,z and any of ux,uy,uz, of a plane body x,y and ux,uy; an empty cell was not measured.
+    """Read x,y,z and any of ux,uy,uz and of exx,eyy.., of a plane body x,y and ux,uy; an empty cell was not measured.
 
     See `read_table`, `LoadCases` and `place`. Points that tell the displacements of the nodes `boundary` are no data.
-    The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y, sigma_z, by which data are then weighted.
+    The noise is `noise` [m], or that of columns sigma or sigma_x, sigma_y, sigma_z, by which data are then weighted;
+    of strains, which weigh by the ratio of both, `strain_noise` [1].
     Raises InputError for a file that cannot be understood, and for points outside the body.
     """
     axes = AXES[: mesh.geometry.dim]
-    table = read_table(path, groups(axes), columns, units)
+    strained = has_strains(path, columns)
+    table = read_table(path, (*groups(axes, "none" if strained else "any"), GROUP), columns, units)
     x, d = table.stack(axes), table.stack([f"u{axis}" for axis in axes])
+    e = strains_of(table, axes) if strained else np.empty((len(x), 0))
     sigma, loads = noise_of(table, axes, d, noise), LoadCases.of(table)
     case = np.zeros(len(x), dtype=int) if loads is None else loads.rows
+    if strained and case.any():
+        raise InputError(f"{path}: strains under several loads are not read - keep the rows of one load")
+    both = np.c_[np.broadcast_to(sigma, d.shape), np.full(e.shape, strain_noise)] if strained else sigma
     kept, repeated = np.zeros(len(x), dtype=bool), set()
     for k in range(case.max() + 1):
         of = case == k
-        among = sigma[of] if isinstance(sigma, np.ndarray) else sigma
-        kept[of], said = without_repeats(path, x[of], d[of], table.lines[of], among)
+        among = both[of] if isinstance(both, np.ndarray) else both
+        kept[of], said = without_repeats(path, x[of], np.c_[d, e][of], table.lines[of], among)
         repeated.add(said)
     around = []
     for k in range(case.max() + 1) if len(boundary) else ():
@@ -139,33 +150,52 @@ def read_probes(
         raise InputError(f"{path}: all points tell boundary=measured, none is left as a datum - measure inside, too")
     placed = place(mesh, x[kept], path, outside)
     rows = np.flatnonzero(kept)[placed.rows]
-    d, case = d[rows], case[rows]
+    d, e, case, weights = d[rows], e[rows], case[rows], None
     measured = ~np.isnan(d)
-    blind = np.setdiff1d(np.arange(1 if loads is None else len(loads.values)), case[measured.any(axis=1)])
+    seen = measured.any(axis=1) | (~np.isnan(e)).any(axis=1)
+    blind = np.setdiff1d(np.arange(1 if loads is None else len(loads.values)), case[seen])
     if blind.size:
         where = "" if loads is None else f" under load {loads.values[blind[0]]:g}, case {blind[0] + 1}"
         raise InputError(f"{path}: measures nothing{where} - give at least one row with a displacement")
-    weights = None
     if isinstance(sigma, np.ndarray):
         level = float(np.mean(sigma[rows][measured] ** -2.0) ** -0.5)
         weights = level / np.where(measured, sigma[rows], level)
         sigma = level
+    doubtful = doubt(sigma, float(np.abs(d[measured]).max())) if measured.any() else ""
+    weight, sigma = _weighed(path, bool(measured.any()), bool((~np.isnan(e)).any()), sigma, strain_noise)
+    strains = StrainGauges.of(mesh.geometry, placed, e, axes, weight)
     everything = Probes(placed.nodes, placed.N, placed.x, measured, weights)
-    doubtful = doubt(sigma, float(np.abs(d[measured]).max(initial=0.0)))
     cases = "" if loads is None else loads.said(rows)
     notes = tuple(filter(None, (table.said, cases, *sorted(repeated), *placed.said, doubtful)))
     d = np.where(measured, d, 0.0)
     of_case = [slice(None)] if loads is None else [np.flatnonzero(case == k) for k in range(case.max() + 1)]
-    return Measured(
-        tuple(everything.at(of) for of in of_case), tuple(d[of] for of in of_case), sigma, loads, tuple(around), notes
-    )
+    each = tuple(everything.at(of) for of in of_case), tuple(d[of] for of in of_case)
+    return Measured(*each, sigma, loads, tuple(around), notes, strains)
 
 
-def groups(axes: str) -> tuple[Group, ...]:
+def _weighed(path: str, moved: bool, strained: bool, sigma: float, strain_noise: float) -> tuple[float, float]:
+    """The weight of strains in J, and the noise of all data as J weighs them. Raises InputError."""
+    if not strained and strain_noise:
+        raise InputError(f"{path}: strain_noise={strain_noise:g}, but no strain was measured - leave it out")
+    if not strained:
+        return 1.0, sigma
+    if not moved and sigma:
+        raise InputError(f"{path}: noise={sigma:g} is of displacements, and strains alone were measured: strain_noise=")
+    if not moved:
+        return 1.0, strain_noise
+    if not (sigma and strain_noise):
+        raise InputError(
+            f"{path}: displacements and strains in one J are weighed by their noise - state both, as in"
+            " noise=0.4um,strain_noise=20microstrain"
+        )
+    return sigma / strain_noise, sigma
+
+
+def groups(axes: str, need: str = "any") -> tuple[Group, ...]:
     """The columns of coordinates, displacements, their noise, and load cases."""
     return (
         Group(tuple(axes), "length", marked=False),
-        Group(tuple(f"u{axis}" for axis in axes), "length", need="any", gaps=True),
+        Group(tuple(f"u{axis}" for axis in axes), "length", need=need, gaps=True),
         Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True),
         LOAD,
         CASE,

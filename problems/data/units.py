@@ -61,14 +61,19 @@ def zero(unit: str, kind: Kind) -> float:
     return ZEROS.get((kind, SPELLINGS.get(name, name)), 0.0)
 
 
-def standard_deviation(noise: float | str | None, of_file: bool, who: str, kind: Kind = "length") -> float:
-    """`noise` in SI, 0 where it is None. Raises InputError unless it is finite and >= 0, of a file's data > 0."""
+def standard_deviation(
+    noise: float | str | None, of_file: bool, who: str, kind: Kind = "length", name: str = "noise"
+) -> float:
+    """The option `name` in SI, 0 where it is None.
+
+    Raises InputError unless it is finite and >= 0, of a file's data > 0.
+    """
     if noise is None:
         return 0.0
-    sigma = quantity(noise, kind, f"{who}: noise={noise}")
+    sigma = quantity(noise, kind, f"{who}: {name}={noise}")
     if sigma < 0.0 or (of_file and sigma == 0.0):
         least = "> 0, or leave it out where it is not known" if of_file else ">= 0"
-        raise InputError(f"{who}: noise={noise} - give a standard deviation {least}")
+        raise InputError(f"{who}: {name}={noise} - give a standard deviation {least}")
     return sigma
 
 

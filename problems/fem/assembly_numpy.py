@@ -94,10 +94,10 @@ class NumpyAssembly:
 
     def reaction_by_p(self, u: Array, p: Array, case: int, e: Array) -> Array:
         """Its derivative (n_p,)."""
-        s, q_p = self.solid.setup(p), self._q_p(p)
-        return self._along(
-            e[self.nodes], self._by_constants(self.solid.displacements(u, s, case, self.nodes), s, q_p), q_p, len(p)
-        )
+        s, q_p, chain = self.solid.setup(p), self._q_p(p), self.solid.design.chain
+        f_q = self._by_constants(self.solid.displacements(u, s, case, self.nodes), s, q_p)
+        by_q = self._along(e[self.nodes], f_q, q_p, len(p))
+        return by_q if chain is None else np.asarray(chain(p).T @ by_q)
 
     def element_tangents(self, u_e: Array, q: Any, dN: Array, dx: Array, selected: Array) -> Array:
         """Entries `pick` of the element matrices: see Solid.tangents."""
@@ -109,22 +109,25 @@ class NumpyAssembly:
         return K
 
     def R_p(self, u: Array, p: Array) -> ByProducts:
-        """R_p (n_u, n_p): each material constant of a cell depends on one parameter."""
+        """R_p (n_u, n_p): each material constant of a cell depends on one parameter, or p on all of them by dq/dp."""
         solid = self.solid
         s, q_p = solid.setup(p), self._q_p(p)
+        by_p = None if solid.design.chain is None else solid.design.chain(p)
         f_q = [self._by_constants(solid.displacements(u, s, case, self.nodes), s, q_p) for case in self._cases]
         f_k = [self._by_springs(u, s, p, case) for case in self._cases]  # of p's last component
 
         def forward(v: Array) -> Array:
+            v_k, v = v[-1], v if by_p is None else by_p @ v
             forces = (sum(f * v[of, None, None] for f, (_, of) in zip(f_case, q_p, strict=True)) for f_case in f_q)
             parts = [solid.bc.assemble(np.asarray(f), self.nodes, case)[0] for case, f in enumerate(forces)]
-            return np.asarray(np.concatenate(parts) + v[-1] * np.concatenate(f_k))
+            return np.asarray(np.concatenate(parts) + v_k * np.concatenate(f_k))
 
         def reverse(lam: Array) -> Array:
             total = np.zeros(len(p))
-            total[-1] = lam @ np.concatenate(f_k)
             for case, f_case in enumerate(f_q):
                 total = total + self._along(solid.bc.variations(lam, case, self.nodes), f_case, q_p, len(p))
+            total = total if by_p is None else by_p.T @ total
+            total[-1] += lam @ np.concatenate(f_k)
             return total
 
         return ByProducts(forward, reverse)

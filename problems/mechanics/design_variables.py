@@ -56,6 +56,8 @@ class DesignVariables:
     parameter_of_cell  (n_e,) index of each cell's parameter, if it is such a field
     moved_nodes        the nodes whose positions p are, if it is a shape
     is_load            whether p is the load amplitude
+    chain              (p) -> dq/dp (n_q, n_p), where p sets constants q that q_p takes for p
+    by_stiffness       (n_p,), dp by the logarithm of the stiffness, where that is constant and p no field
     """
 
     parameters: Parameters
@@ -66,6 +68,8 @@ class DesignVariables:
     parameter_of_cell: Array | None = None
     moved_nodes: Array | None = None
     is_load: bool = False
+    chain: Callable[[Array], Array] | None = None
+    by_stiffness: Array | None = None
 
 
 def default_modulus(x: Array) -> Array:

@@ -21,6 +21,7 @@ from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions,
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
 from gradient_routes.problems.mechanics import design_variables
+from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.design_variables import (
     CELLWISE,
     FIELDS,
@@ -37,6 +38,7 @@ from gradient_routes.problems.mechanics.measured_boundary import force_data, for
 from gradient_routes.problems.mechanics.springs import Springs
 from gradient_routes.problems.problem import (
     Array,
+    End,
     Fields,
     Linearization,
     Offers,
@@ -95,7 +97,9 @@ class Solid(Problem):
         uniform = o.data is not None or o.modulus is not None
         if o.direction is not None:
             directions = load_direction(o.direction, top, self.name)[None]
-        found = probes.read_probes(mesh, o.data, o.columns, o.units, o.outside, noise, known) if measured else None
+        strain_noise = standard_deviation(o.strain_noise, True, self.name, "ratio", "strain_noise")
+        reading = (o.columns, o.units, o.outside, noise, known, strain_noise)
+        found = probes.read_probes(mesh, o.data, *reading) if measured else None
         traction = o.traction if o.force is None else o.force / area
         amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
         loads = None if found is None else found.loads
@@ -104,6 +108,7 @@ class Solid(Problem):
             amplitude, directions = 0.0, np.repeat(directions[:1], 1 if loads is None else len(loads.values), axis=0)
         elif loads is not None:
             amplitude, directions = self._by_file(loads, amplitude, directions[0], area)
+        self.constants = None if o.constants is None else Constants.parse(o.constants, law, self.name)
         field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
         q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
         choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
@@ -111,7 +116,11 @@ class Solid(Problem):
             "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, E, o.layers),
             "regions": lambda: design_variables.regions(mesh, law, o.nu, self.log, uniform, E),
             "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
-            "constants": lambda: design_variables.constants(mesh, law, o.nu, E),
+            "constants": lambda: (
+                self.constants.design(mesh, law, o.nu, E)
+                if self.constants
+                else design_variables.constants(mesh, law, o.nu, E)
+            ),
             "traction": lambda: design_variables.tractions(mesh, top, amplitude * directions[0]),
             "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d([*clamp, *supported], top.node_set)),
             "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
@@ -144,7 +153,8 @@ class Solid(Problem):
             self.data, said = self._from_file(found, F, apart)
             self.read_as = (*found.notes, *said, *self._load_in_words(o.loaded))
             self.notes += self.read_as
-            self.start_from_data = o.modulus is None and o.unknown in FITTED and (not gripped or F is not None)
+            told = o.modulus is not None or (self.constants is not None and bool({*self.constants.start} - {"nu"}))
+            self.start_from_data = not told and o.unknown in FITTED and (not gripped or F is not None)
         elif o.markers:
             in_plane = o.components == "in-plane"
             self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
@@ -179,9 +189,13 @@ class Solid(Problem):
         greatest, size = max(float(np.abs(d).max()) for d in measured.d), self.mesh.diameter
         if greatest > size:
             self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        data = DisplacementData(self.solid, measured.probes, measured.d, measured.sigma)
+        if measured.strains is not None and self.solid.design.moved_nodes is not None:
+            raise InputError(f"{self.name}: strains are read in a mesh that stands still, not with unknown=shape")
+        data = DisplacementData(self.solid, measured.probes, measured.d, measured.sigma, strains=measured.strains)
         if F is not None:
             d = np.concatenate([d[at.measured] for at, d in zip(measured.probes, measured.d, strict=True)])
+            if not d.size:
+                raise InputError(f"{self.name}: force= of a grip is weighed beside displacements - measure some, too")
             rms = float(np.sqrt(np.mean(d**2)))
             direction = self.solid.directions[0]
             force, note = force_data(self.solid, F, direction, apart, o["force_noise"], measured.sigma, rms)
@@ -297,6 +311,8 @@ class Solid(Problem):
         displaced = self.solid.load == "displacement" and self.data.force is None
         if self._options["unknown"] not in MATERIAL or displaced:
             return None
+        if self.solid.design.by_stiffness is not None:
+            return np.asarray(p + np.log(factor) * self.solid.design.by_stiffness)
         q = p + np.log(factor) if self._is_log else factor * p
         if self.solid.springs is not None and self.log:
             q[-1] = p[-1] + np.log(factor)
@@ -316,15 +332,21 @@ class Solid(Problem):
 
     @property
     def _is_log(self) -> bool:
-        return self.log and self.solid.design.field is not None
+        design = self.solid.design
+        return (self.log and design.field is not None) or design.by_stiffness is not None
 
     def stated(self, p: Array) -> dict[str, Any]:
-        """Young's modulus and Poisson's ratio, where p are Lame's constants, and the stiffness of springs."""
+        """Constants as people state them, E and nu besides, of laws that have them; the stiffness of springs."""
         k = {} if self.solid.springs is None else {"k [Pa/m]": self.solid.springs.k(p)}
+        if self.constants is not None and self.constants.paired:
+            return self.constants.stated(p[:2]) | k
         if self._options["unknown"] != "constants" or self.solid.law.constants != ("mu", "lam"):
             return k
         mu, lam = p[:2]
         return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)} | k
+
+    def ends(self, p: Array) -> list[End]:
+        return self.constants.ends(p[:2]) if self.constants is not None and self.constants.paired else []
 
     # --- synthetic data
 

@@ -25,6 +25,10 @@ MeshUnit = Annotated[Literal["m", "mm", "um"], "of the mesh file; all the rest i
 Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom: rollers, planes of symmetry"]
 Law = Annotated[LawName, "stored energy"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
+Constants = Annotated[
+    str | None,
+    "that are unknown: E,nu mu,lam K,G C10,C01,c .., with starts as in E:200GPa,nu:0.3 [mu,lam, untransformed]",
+]
 Modulus = Annotated[float | None, "Young's, to start from or known [1; fitted to a file's data]"]
 Derivatives = Annotated[
     Literal["ad", "hand"] | None, "P, dP/dF, dP/dq by JAX or hand-derived in NumPy [hand where they exist]"
@@ -44,6 +48,7 @@ MotionOf = Annotated[MotionName, "of the camera or the grips, unknown, in the da
 Direction = Annotated[str | None, "of a dead load or a grip: x, -z, 0,0.6,0.8 or normal [the last axis]"]
 Force = Annotated[float | None, "total on the loaded face, instead of traction=, or measured on a grip [N]"]
 Noise = Annotated[float | str | None, "standard deviation of a file's data, added to a twin's [m], or 0.4um"]
+StrainNoise = Annotated[float | str | None, "that of a file's strains exx,eyy,exy.. [1], or 20microstrain"]
 Seed = Annotated[int, "of noise and markers"]
 Alpha = Annotated[float, "weight of Phi"]
 PhiWidth = Annotated[float, "jump of log E below which total variation is rounded"]
@@ -94,6 +99,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
     meshed, measured, gripped = o.mesh is not None, o.data not in (None, "twin"), o.load == "displacement"
     counts = {"n": o.n != 4} | {f"n{axis}": getattr(o, f"n{axis}") for axis in axes}
     at_data, forced = o.boundary == "measured", o.load == "traction" or (gripped and measured)
+    stated = (o.constants or "").replace(" ", "")
     element = o.element != ("hex8" if axes == "xyz" else "quad4")
     check_applies(
         who,
@@ -108,6 +114,7 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("clamped", o.clamped != "none", True, {"support": o.support != "clamp"}),
         ("boundary=measured", at_data, False, {"displacement": o.displacement != 0.2}),
         ("load=displacement and data=FILE", gripped and measured, True, {"force_noise": o.force_noise is not None}),
+        ("data=FILE", measured, True, {"strain_noise": o.strain_noise is not None}),
         ("load=follower", o.load == "follower", False, {"direction": o.direction}),
         ("cases", o.cases > 1, False, {"direction": o.direction}),
         ("load=traction, or a grip and data=FILE", forced, True, {"force": o.force is not None}),
@@ -118,6 +125,9 @@ def _check_applies(who: str, o: SimpleNamespace, axes: str) -> None:
         ("unknown=shape", o.unknown == "shape", True, {"surface": o.surface != "right"}),
         ("load=displacement", gripped, True, {"displacement": o.displacement != 0.2}),
         ("load=displacement", gripped, False, {"traction": o.traction != 0.2}),
+        ("unknown=constants", o.unknown == "constants", True, {"constants": o.constants}),
+        ("starts in constants", ":" in stated.replace("nu:", ""), False, {"modulus": o.modulus is not None}),
+        ("starts in constants", "nu:" in stated, False, {"nu": o.nu != 0.3}),
         ("phi=tv", o.phi == "tv", True, {"phi_width": o.phi_width != PHI_WIDTH}),
         ("unknown=modulus or layers", o.unknown in FIELDS, True, {"phi": o.phi in ("tikhonov", "tv")}),
         ("unknown=modulus, layers or regions", o.unknown in MODULI, True, {"parametrization": o.parametrization}),

@@ -89,11 +89,13 @@ class Springs:
         def apply(s: Setup, p: Any, xp: Any) -> Setup:
             return replace(design.apply(s, p[:-1], xp), k=self.k(p, xp))
 
-        q_p = design.q_p
+        q_p, chain, by_stiffness = design.q_p, design.chain, design.by_stiffness
         return replace(
             design,
             parameters=parameters,
             apply=apply,
             truth=with_k(design.truth, start + np.log(2.0) if self.log else 2.0 * k),
             q_p=None if q_p is None else lambda p: q_p(p[:-1]),
+            chain=None if chain is None else lambda p: np.pad(chain(p[:-1]), ((0, 1), (0, 1))),
+            by_stiffness=None if by_stiffness is None else np.append(by_stiffness, 1.0),
         )

@@ -315,6 +315,20 @@ def test_rows_that_repeat_others_count_once_and_other_values_are_refused(box: Me
     assert len(found.d[0]) == 3
 
 
+def test_pairs_tell_the_noise_that_is_not_stated_unless_they_are_of_two_loads(box: Mesh, file: File) -> None:
+    g, z = np.random.default_rng(0), np.linspace(0.1, 0.9, 9)
+    for second, says in ((1.0, "within a noise of "), (1.5, None)):
+        rows = [(z_i, load * 1e-3 * z_i + 1e-5 * g.standard_normal()) for z_i in z for load in (1.0, second)]
+        path = file(HEAD + "".join(f"0.5,0.5,{z_i:g},{u:.9g}\n" for z_i, u in rows))
+        if says:
+            (note,) = probes(box, path).notes
+            assert says in note
+            assert note.endswith("that they tell: 9")
+        else:
+            with pytest.raises(InputError, match="is given twice"):
+                probes(box, path)
+
+
 def test_two_rows_may_measure_two_components_of_one_point(box: Mesh, file: File) -> None:
     found = probes(box, file("x,y,z,ux,uz\n0.5,0.5,1,1e-3,\n0.5,0.5,1,,2e-3\n"))
     assert found.probes[0].measured.sum() == 2

@@ -114,7 +114,7 @@ def test_a_strip_tells_E_and_nu_by_its_force(tmp_path: Path) -> None:
     assert "not stated, is in no error bar" in said
     assert "force: 2000 N along (1, 0) on the loaded face, +- 20 N (1 % of it; force_noise= states another)" in said
     found = fit(plate, Evaluation(p, p, 0.0, p, p), TIGHT)
-    assert found.thirds["E [Pa]"] == pytest.approx([E] * 3, rel=1e-2)  # the force belongs to each third
+    assert found.constants.thirds["E [Pa]"] == pytest.approx([E] * 3, rel=1e-2)  # the force belongs to each third
 
 
 def test_a_traction_on_a_moved_specimen_tells_its_start(tmp_path: Path) -> None:
@@ -128,8 +128,9 @@ def test_a_traction_on_a_moved_specimen_tells_its_start(tmp_path: Path) -> None:
         GRIP | {"force_noise": "5 N", "noise": 1e-7, "motion": "rigid"},
         STRIP | {"unknown": "modulus", "force": None, "data": None},
         {"nx": 2, "ny": 1, "law": "linear", "unknown": "modulus", "derivatives": None},
+        GRIP | {"constants": "E,nu"},
     ],
-    ids=["by hand", "traction", "by JAX"],
+    ids=["by hand", "traction", "by JAX", "E,nu"],
 )
 def test_exact_routes_agree_with_complex_steps(options: dict[str, Any], tmp_path: Path) -> None:
     """Two loads, each with its boundary values and its force; by JAX, which compiles each, one."""

@@ -71,6 +71,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "layers, Tikhonov": {"unknown": "layers", "layers": 2, "alpha": 0.1},
     "raw moduli, two loads": {"parametrization": "raw", "cases": 2, "alpha": 0.1, "phi": "tv"},
     "constants": {"unknown": "constants", "law": "mooney-rivlin", "alpha": 1e-3},
+    "E,nu": {"unknown": "constants", "constants": "E,nu"},
     "a ring": {"kind": "axisymmetric", "radius": 0.5, "element": "tri6", "data": "twin", "noise": 1e-3},
     "raw moduli, amplitude": {
         "parametrization": "raw",

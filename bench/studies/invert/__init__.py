@@ -10,7 +10,7 @@ import click
 from gradient_routes.bench.cases.column import Table
 from gradient_routes.bench.cases.study import Rule, Study
 from gradient_routes.bench.command_options import at_option, replaces, routes_option, solver_options
-from gradient_routes.bench.inversion.columns import ESTIMATES, INVERSION, LCURVE, TRADEOFF
+from gradient_routes.bench.inversion.columns import CONSTANTS, ESTIMATES, FIT, INVERSION, LCURVE, RESIDUALS, TRADEOFF
 from gradient_routes.bench.ranges import COUNT, FROM_ZERO, POSITIVE, SEED, Whole
 from gradient_routes.bench.studies.options import problem_option
 
@@ -97,6 +97,9 @@ STUDY = Study(
     tables={
         "inversion": Table(INVERSION, (*RUN, "alpha")),
         "estimates": Table(ESTIMATES, (*RUN, "alpha")),
+        "constants": Table(CONSTANTS, (*RUN, "alpha")),
+        "fit": Table(FIT, (*RUN, "alpha")),
+        "residuals": Table(RESIDUALS, (*RUN, "alpha")),
         "lcurve": Table(LCURVE, RUN),
         "tradeoff": Table(TRADEOFF, RUN),
     },

@@ -11,6 +11,7 @@ from gradient_routes.bench.render.picking import each, grouped, real, tabulate, 
 from gradient_routes.bench.render.source import Source
 from gradient_routes.bench.studies.invert import estimates_figures as estimates
 from gradient_routes.bench.studies.invert import regularization_figures as regularization
+from gradient_routes.bench.studies.invert import residuals_figures as residuals
 
 CLOSE = 1.1  # times the least misfit that a run on the problem ended with: arrived
 REACHED = (
@@ -27,10 +28,17 @@ REACHED = (
 
 def section(source: Source) -> Section | None:
     rows = [row | {"run": named(row)} for row in source.table("inversion")]
-    found = [
-        row | {"run": named(row), "panel": f"{row['problem']} by {named(row)}"} for row in source.table("estimates")
-    ]
-    figures = (history(rows), reached(rows), *estimates.figures(found), *regularization.figures(source))
+    found, constants, met, missed = (
+        [row | {"run": named(row), "panel": f"{row['problem']} by {named(row)}"} for row in source.table(table)]
+        for table in ("estimates", "constants", "fit", "residuals")
+    )
+    fields = (
+        *estimates.figures(found),
+        *residuals.constants(constants),
+        *residuals.fits(met),
+        *residuals.figures(missed),
+    )
+    figures = (history(rows), reached(rows), *fields, *regularization.figures(source))
     drawn = tuple(f for f in figures if f is not None)
     says = "From gradients to parameters: the misfit step by step, what was found, how much to regularize."
     return Section("inversion", "Inversion", says, drawn) if drawn else None

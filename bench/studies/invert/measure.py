@@ -97,9 +97,10 @@ class Run:
             starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
         one_shot = self._one_shot(problem)
         done = self._until_it_ends(self._inversions(problem, starts, minibatch, seed, one_shot))
-        for table in ("inversion", "estimates"):
-            for found in done:
-                self._keep(table, found.tables[table])
+        kept = [found.tables for found in done]
+        for table in ("inversion", "estimates", "constants", "fit", "residuals"):
+            for tables in kept:
+                self._keep(table, tables.get(table, ()))
         self.say(Found(Compared(done)))
 
     def _inversions(

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gradient_routes.bench.cases.case import problems, routes
-from gradient_routes.bench.inversion.fit import Residuals, fitted
+from gradient_routes.bench.inversion.fit import fitted
 from gradient_routes.bench.inversion.invert import Engine, invert
+from gradient_routes.bench.inversion.residuals import Residuals
 from gradient_routes.problems.data.observation import Observation
 
 SIGMA = 1e-3
@@ -126,3 +127,66 @@ def test_E_and_nu_are_stated_with_error_bars_and_a_misfit_is_flagged(cli, tmp_pa
             assert abs(E_found - E) < 4 * sd_E
             assert abs(nu_found - nu) < 4 * sd_nu
             assert 0.0 < sd_E < 1e-2
+
+
+PATCH = "plate[n=1,clamped=none,fixed=x@left,y@bottom,law=linear,unknown=constants,traction=0.1,noise=1e-5,data=d.csv"
+
+
+def patch(nu: float, columns: str) -> str:
+    """Plane stress of E = 2 Pa pulled by 0.1 Pa: ux = -nu t x / E, uy = t y / E, with noise."""
+    noise = iter(np.random.default_rng(4).standard_normal(200) * 1e-5)
+    of = {"ux": lambda x, y: -nu * 0.05 * x, "uy": lambda x, y: 0.05 * y}
+    rows = [
+        ",".join(f"{v:.9g}" for v in (x, y, *(of[name](x, y) + next(noise) for name in columns.split(","))))
+        for x in (0.1, 0.4, 0.6, 0.8)
+        for y in (0.3, 0.5, 0.7, 1.0)
+    ]
+    return "\n".join([f"x,y,{columns}", *rows])
+
+
+def said(cli, folder, constants: str, nu: float = 0.25, columns: str = "ux,uy") -> dict:
+    (folder / "d.csv").write_text(patch(nu, columns))
+    problem = f"{PATCH},constants={constants}]"
+    ran = cli("invert", "--problem", problem, "--optimizer", "gauss-newton", "--no-store", "--json")
+    return {row["constant"]: row for row in ran.rows if row["table"] == "constants"} | {"code": ran.code}
+
+
+def test_constants_of_every_choice_are_the_same_with_the_same_bars(cli, tmp_path) -> None:
+    """E and nu from E,nu and from K,G; sd(E) and their correlation as of closed-form least squares."""
+    one, other = said(cli, tmp_path, "E:1,nu:0.4"), said(cli, tmp_path, "K,G")
+    for name in ("E [Pa]", "nu"):
+        assert one[name]["value"] == pytest.approx(other[name]["value"], rel=1e-6)
+        assert one[name]["sd"] == pytest.approx(other[name]["sd"], rel=1e-5)
+    x, y = (np.array([0.1, 0.4, 0.6, 0.8]), np.array([0.3, 0.5, 0.7, 1.0]))
+    sd_y = 1e-5 / np.sqrt(4 * y @ y)  # of the strains t/E and nu t/E
+    sd_x = 1e-5 / np.sqrt(4 * x @ x)
+    E, nu = one["E [Pa]"]["value"], one["nu"]["value"]
+    by = np.array([[-(E**2) / 0.1, 0.0], [-nu * E / 0.1, E / 0.1]])  # E and nu by the strains
+    C = by @ np.diag([sd_y**2, sd_x**2]) @ by.T
+    assert [one["E [Pa]"]["sd"], one["nu"]["sd"]] == pytest.approx(np.sqrt(np.diag(C)), rel=1e-6)
+    assert one["E [Pa]"]["correlations"]["nu"] == pytest.approx(C[0, 1] / np.sqrt(C[0, 0] * C[1, 1]), rel=1e-6)
+    assert other["K [Pa]"]["value"] == pytest.approx(E / 3 / (1 - 2 * nu), rel=1e-5)
+
+
+def test_a_constant_at_its_bound_has_no_bar_and_the_other_one_has_with_it_held(cli, tmp_path) -> None:
+    """Data of nu = 0.7: nu ends at 0.5, and E is that of one unknown, E^2 sigma / (t |(y, x/2)|)."""
+    found = said(cli, tmp_path, "E,nu", nu=0.7)
+    assert found["code"] == 1
+    assert (found["nu"]["bound"], found["nu"]["sd"]) == ("0.5", None)
+    assert found["nu"]["value"] == pytest.approx(0.5, abs=1e-6)
+    squares = 4 * (np.array([0.3, 0.5, 0.7, 1.0]) ** 2).sum() + (np.array([0.1, 0.4, 0.6, 0.8]) ** 2).sum()
+    sd = found["E [Pa]"]["value"] ** 2 * 1e-5 / (0.1 * np.sqrt(squares))
+    assert found["E [Pa]"]["sd"] == pytest.approx(sd, rel=1e-5)
+    ran = cli("invert", "--problem", f"{PATCH},constants=E,nu]", "--no-store", "--no-plot")
+    assert "nu is at its bound, 0.5: dJ/dnu < 0, the data want it beyond; error bars of the others are" in ran.out
+
+
+def test_a_blind_direction_is_named_and_gets_no_bar(cli, tmp_path) -> None:
+    found = said(cli, tmp_path, "K,G", columns="uy")
+    assert found["K [Pa]"]["sd"] is found["G [Pa]"]["sd"] is found["nu"]["sd"] is None
+    assert found["E [Pa]"]["sd"] == pytest.approx(
+        4e-5 / (0.1 * np.sqrt(4 * (0.3**2 + 0.5**2 + 0.7**2 + 1.0))), rel=1e-3
+    )
+    ran = cli("invert", "--problem", f"{PATCH},constants=K,G]", "--no-store", "--no-plot")
+    assert re.search(r"^blind direction: data do not see 0.99 log K -0.15 log G$", ran.out, re.M)
+    assert "\nnu 0.3 without an error bar\n" in ran.out
