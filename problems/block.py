@@ -10,7 +10,8 @@ import numpy as np
 from gradient_routes.problems.data.regularization import PHI_WIDTH, Phi
 from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.fem.elements import SolidElement
-from gradient_routes.problems.fem.mesh import box_mesh, read_mesh
+from gradient_routes.problems.fem.mesh import box_mesh
+from gradient_routes.problems.fem.mesh_files import read_mesh
 from gradient_routes.problems.mechanics import solid_options as options
 from gradient_routes.problems.mechanics.design_variables import DesignName
 from gradient_routes.problems.mechanics.solid import Solid

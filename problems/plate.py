@@ -12,7 +12,8 @@ import numpy as np
 from gradient_routes.problems.data.regularization import PHI_WIDTH, Phi
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.fem.elements import PlaneElement
-from gradient_routes.problems.fem.mesh import Mesh, read_mesh
+from gradient_routes.problems.fem.mesh import Mesh
+from gradient_routes.problems.fem.mesh_files import read_mesh
 from gradient_routes.problems.fem.plane_meshes import hole_mesh, rectangle_mesh
 from gradient_routes.problems.mechanics import solid_options as options
 from gradient_routes.problems.mechanics.design_variables import PlaneDesign

@@ -1,19 +1,15 @@
-"""Meshes of boxes and of mesh files, and parts of their boundary by name or by plane."""
+"""Meshes, of boxes among them, and parts of their boundary by name or by plane."""
 
 from __future__ import annotations
 
-import io
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.data.units import UNITS
 from gradient_routes.problems.errors import InputError
-from gradient_routes.problems.fem.elements import BRICKS, MESHIO, Element, ElementName, Geometry
+from gradient_routes.problems.fem.elements import BRICKS, Element, ElementName, Geometry
 from gradient_routes.problems.fem.facets import Facets
 from gradient_routes.problems.problem import Array
 
@@ -24,12 +20,6 @@ SIDES = {
 }
 AXES = "xyz"
 PLANE_TOLERANCE = 1e-6  # of the diameter: largest distance of a facet's nodes from the plane
-MESHIO_CELLS: dict[int, dict[str, ElementName]] = {  # by meshio's names, for each dimension
-    3: {MESHIO[element][0]: element for element in ("hex8", "tet4", "tet10")},
-    2: {MESHIO[element][0]: element for element in ("quad4", "quad8", "tri3", "tri6")},
-}
-LOWER_DIMENSIONAL = {3: ("vertex", "line", "triangle", "quad"), 2: ("vertex", "line")}  # beginnings of meshio's names
-CORNERS = {"line3": ("line", 2), "triangle6": ("triangle", 3), "quad8": ("quad", 4)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,53 +97,6 @@ def box_mesh(who: str, element: ElementName, cells: tuple[int, int, int], size: 
     return make_mesh(who, element, mesh if element in BRICKS else mesh.to_meshtet())
 
 
-def read_mesh(who: str, path: str | Path, unit: str = "m", dim: int = 3) -> Mesh:
-    """The hexahedra or tetrahedra of a mesh file that meshio reads, with its named boundaries; dim = 2: the
-    quadrilaterals or triangles, in a plane z = constant. `unit` is the file's.
-
-    Raises InputError for a file that cannot be read, without cells of one kind and this dimension, or inverted ones.
-    """
-    import meshio
-    from skfem.io.meshio import from_meshio
-
-    if not Path(path).is_file():
-        raise InputError(f"{who}: mesh={path}: no such file - check the path")
-    said_aside = io.StringIO()
-    try:
-        with redirect_stdout(said_aside), redirect_stderr(said_aside):
-            found = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio's readers raise errors of many types
-        said = " ".join(f"{said_aside.getvalue()} {error}".split()) or f"{type(error).__name__}, a broken file?"
-        raise InputError(f"{who}: mesh={path} cannot be read ({said}) - give a format meshio knows") from None
-    known = MESHIO_CELLS[dim]
-    kinds = [kind for kind in found.cells_dict if not kind.startswith(LOWER_DIMENSIONAL[dim])]
-    if len(kinds) != 1 or kinds[0] not in known:
-        has = ", ".join(found.cells_dict) or "no cells"
-        raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(known)}")
-    element, cells = known[kinds[0]], found.cells_dict[kinds[0]]
-    if cells.min() < 0 or cells.max() >= len(found.points):
-        raise InputError(f"{who}: mesh={path} has cells of points beyond its {len(found.points)} - correct the file")
-    X = found.points
-    if not dim <= X.shape[1] <= 3:
-        raise InputError(
-            f"{who}: mesh={path} has points of {X.shape[1]} coordinates - it needs {', '.join(AXES[:dim])}"
-        )
-    X = found.points = X * UNITS["length"][unit]
-    if dim == 2 and X.shape[1] == 3 and np.ptp(X[cells], axis=(0, 1))[2] > PLANE_TOLERANCE * np.ptp(X[cells]):
-        low, high = X[cells][..., 2].min(), X[cells][..., 2].max()
-        raise InputError(f"{who}: mesh={path} is not plane: z from {low:g} to {high:g} - give one in the plane z = 0")
-    for block in found.cells:  # scikit-fem matches facets by their corners only, and has no quad8
-        if block.type in CORNERS and (dim, block.type) != (2, "triangle6"):
-            block.type, block.data = CORNERS[block.type][0], block.data[:, : CORNERS[block.type][1]]
-    kind = "quad" if element == "quad8" else kinds[0]
-    mesh = make_mesh(who, element, from_meshio(found, force_meshio_type=kind, ignore_orientation=True))
-    if element == "quad8":
-        geometry = replace(mesh.geometry, nodes=cells, X=np.ascontiguousarray(X[:, :2]))
-        mesh = replace(mesh, geometry=geometry)
-    check_cells(mesh, f"mesh={path}", "correct the mesh")
-    return mesh
-
-
 def check_cells(mesh: Mesh, what: str, do: str) -> None:
     """Raises InputError for flat, inverted or overlapping cells; either orientation of the numbering is valid."""
     geometry, skfem_mesh = mesh.geometry, mesh.skfem_mesh
@@ -177,14 +120,14 @@ def check_cells(mesh: Mesh, what: str, do: str) -> None:
 
 
 def make_mesh(who: str, element: ElementName, mesh: Any) -> Mesh:
-    """From scikit-fem's mesh of the corners, or of all nodes of a tet10 or tri6."""
-    from skfem import MeshTet2, MeshTri2
+    """From scikit-fem's mesh of the corners; other nodes are in the middle of edges."""
+    from skfem import MeshTet2
 
-    if element in ("quad8", "tri6") and not isinstance(mesh, MeshTri2):
+    if element in ("quad8", "tri6"):
         nodes = np.concatenate([mesh.t, mesh.nvertices + mesh.t2f])
         X = np.concatenate([mesh.p, mesh.p[:, mesh.facets].mean(axis=1)], axis=1)
         return Mesh(who, mesh, Geometry(Element(element), nodes.T, np.ascontiguousarray(X.T)))
-    if element in ("tet10", "tri6"):
-        quadratic = mesh if isinstance(mesh, MeshTet2 | MeshTri2) else MeshTet2.from_mesh(mesh)
-        return Mesh(who, quadratic, Geometry(Element(element), quadratic.dofs.element_dofs.T, quadratic.doflocs.T))
+    if element == "tet10":
+        mesh = MeshTet2.from_mesh(mesh)
+        return Mesh(who, mesh, Geometry(Element(element), mesh.dofs.element_dofs.T, mesh.doflocs.T))
     return Mesh(who, mesh, Geometry(Element(element), np.ascontiguousarray(mesh.t.T), np.ascontiguousarray(mesh.p.T)))

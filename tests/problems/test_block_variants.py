@@ -20,7 +20,8 @@ from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.fem.assembly_jax import gradient
 from gradient_routes.problems.fem.elements import Element, Geometry
 from gradient_routes.problems.fem.locating import locate
-from gradient_routes.problems.fem.mesh import box_mesh, read_mesh
+from gradient_routes.problems.fem.mesh import box_mesh
+from gradient_routes.problems.fem.mesh_files import read_mesh
 from gradient_routes.problems.jax64 import jax
 from gradient_routes.problems.mechanics.materials import LAWS
 from gradient_routes.problems.problem import Array
