@@ -48,6 +48,19 @@ def locate(geometry: Geometry, x: Array) -> Located:
     return search.found
 
 
+def holders(geometry: Geometry, x: Array, tolerance: float) -> tuple[Array, Array]:
+    """All pairs of one of the points x (m, d) and a cell that holds it, up to a tolerance in reference coordinates."""
+    search = _Search.of(geometry, x)
+    points, cells = search.boxes_about(np.arange(len(x)))
+    held = np.zeros(len(points), dtype=bool)
+    for k in range(0, len(points), PAIRS):
+        some, these = points[k : k + PAIRS], cells[k : k + PAIRS]
+        xi, distance = search.in_cells(x[some], these)
+        near = distance <= tolerance * search.size[these]
+        held[k : k + PAIRS] = near & (geometry.element.outside(xi) <= tolerance)
+    return points[held], cells[held]
+
+
 @dataclass(frozen=True, eq=False)
 class _Search:
     """Points x (m, d), what is found of them, and of every cell: nodes X (n_e, n_a, d), size (n_e,), and the linear
@@ -80,7 +93,7 @@ class _Search:
         found = self.found
         for k in range(0, len(points), PAIRS):
             some, these = points[k : k + PAIRS], cells[k : k + PAIRS]
-            xi, distance = self._in_cells(self.x[some], these)
+            xi, distance = self.in_cells(self.x[some], these)
             order = np.lexsort((distance, some))
             best = order[np.append(True, np.diff(some[order]) > 0)]  # the nearest cell of every point
             better = best[distance[best] < found.distance[some[best]]]
@@ -102,7 +115,7 @@ class _Search:
         held = ((low[cells] <= self.x[points]) & (self.x[points] <= high[cells])).all(axis=1)
         return points[held], cells[held]
 
-    def _in_cells(self, x: Array, cells: Array) -> tuple[Array, Array]:
+    def in_cells(self, x: Array, cells: Array) -> tuple[Array, Array]:
         """xi (m, d) of points x (m, d) in a cell (m,) each, x = sum_a N_a(xi) X_a by Newton's method, and distances."""
         element, X, size = self.element, self.X[cells], self.size[cells]
         rounded = NEWTON_TOLERANCE * size + 4.0 * np.finfo(float).eps * np.abs(x).max(axis=1)

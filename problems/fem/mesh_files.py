@@ -14,6 +14,7 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import MESHIO, Element, ElementName, Geometry
 from gradient_routes.problems.fem.mesh import AXES, PLANE_TOLERANCE, Mesh, check_cells
 from gradient_routes.problems.fem.mesh_groups import boundaries_of, regions_of
+from gradient_routes.problems.fem.seams import check_seams
 
 MESHIO_CELLS: dict[int, dict[str, ElementName]] = {  # by meshio's names, for each dimension
     3: {MESHIO[element][0]: element for element in ("hex8", "tet4", "tet10")},
@@ -62,6 +63,7 @@ def read_mesh(who: str, path: str | Path, unit: str = "m", dim: int = 3) -> Mesh
     skfem_mesh = skfem_mesh.with_boundaries(boundaries).with_subdomains((own.subdomains or {}) | regions)
     mesh = Mesh(who, skfem_mesh, Geometry(Element(element), nodes, np.ascontiguousarray(X[:, :dim])))
     check_cells(mesh, f"mesh={path}", "correct the mesh")
+    check_seams(mesh, f"mesh={path}")
     return mesh
 
 
@@ -72,7 +74,7 @@ def _kind_of_cells(who: str, path: str | Path, found: Any, dim: int) -> str:
     if len(kinds) != 1 or kinds[0] not in known:
         has = ", ".join(found.cells_dict) or "no cells"
         raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(known)}")
-    return kinds[0]
+    return str(kinds[0])
 
 
 def _corners(found: Any, kind: str) -> Any:

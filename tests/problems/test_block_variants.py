@@ -416,7 +416,7 @@ def test_points_in_the_bulge_of_a_curved_side_are_found() -> None:
 def test_meshes_in_two_parts_and_of_two_kinds_are_refused(tmp_path: Path) -> None:
     box = box_mesh("box", "hex8", (1, 1, 1), (1.0, 1.0, 1.0))
     name, cells = box.geometry.for_meshio()
-    X = np.concatenate([box.geometry.X, box.geometry.X + np.array([0, 0, 1])])
+    X = np.concatenate([box.geometry.X, box.geometry.X + np.array([0, 0, 2])])
     two = tmp_path / "two.vtu"
     Mesh(X, [(name, np.concatenate([cells, cells + 8]))]).write(two)
     with pytest.raises(InputError, match="part 2 of 2"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 
@@ -130,3 +131,56 @@ def test_a_face_of_which_a_part_is_no_side_of_a_cell_is_refused(tmp_path: Path) 
     entities[0] = (dim, kind, np.concatenate([lines, [[0, 8]]]), groups)  # a diagonal of the square
     with pytest.raises(InputError, match="1 of 3 facets of foot are sides of no cell"):
         read_mesh("plate", msh(tmp_path / "diagonal.msh", "4.1", mesh.geometry.X, entities), dim=2)
+
+
+def two_bodies(element: Any, folder: Path, along: int, shift: float, merged: bool) -> str:
+    """A file of two squares or cubes of two cells along each edge, `along` in the second; it begins at x = shift."""
+    solid = element in ("hex8", "tet4")
+    points, cells, count = [], [], 0
+    for x, n in ((0.0, 2), (shift, along)):
+        if solid:
+            geometry = box_mesh("block", element, (1, n, n), (1, 1, 1)).geometry
+        else:
+            geometry = rectangle_mesh("plate", element, (1, n), (1, 1)).geometry
+        name, nodes = geometry.for_meshio()
+        points.append(np.pad(geometry.X, ((0, 0), (0, 3 - geometry.dim))) + np.array([x, 0, 0]))
+        cells.append(nodes + count)
+        count += len(geometry.X)
+    X, t = np.concatenate(points), np.concatenate(cells)
+    if merged:
+        X, number = np.unique(np.round(X, 9), axis=0, return_inverse=True)
+        t = number.ravel()[t]
+    path = folder / "two.vtu"
+    meshio.Mesh(X, [(name, t)]).write(path)
+    return str(path)
+
+
+SEAM = "nodes of cells that touch are not joined, pairs at one place: "
+HANGING = "nodes that lie in or on cells without being joined to them: "
+
+
+@pytest.mark.parametrize(
+    ("element", "along", "shift", "merged", "says"),
+    [
+        ("quad4", 2, 1.0, True, ""),
+        ("quad4", 2, 1.0, False, SEAM + r"3, 4 and 7 at \(1, 0\), 5 and 8 at"),
+        ("quad4", 2, 1.001, False, ""),  # a gap
+        ("quad4", 4, 1.0, True, HANGING + r"2, 5 at \(1, 0.25\) in cell 1, 7 at \(1, 0.75\) in cell 2 - refine"),
+        ("tri6", 4, 1.0, True, HANGING + "4"),
+        ("tri3", 3, 1.0, False, SEAM + "2"),
+        ("hex8", 2, 1.0, True, ""),
+        ("hex8", 2, 1.0, False, SEAM + "9"),
+        ("hex8", 4, 1.0, True, HANGING + "16"),
+        ("tet4", 4, 1.0, True, HANGING + "16"),
+        ("hex8", 2, 0.9, False, HANGING),  # one in the other
+    ],
+)
+def test_unmerged_seams_and_hanging_nodes_are_refused(
+    element: Any, along: int, shift: float, merged: bool, says: str, tmp_path: Path
+) -> None:
+    path, dim = two_bodies(element, tmp_path, along, shift, merged), 3 if element in ("hex8", "tet4") else 2
+    if says:
+        with pytest.raises(InputError, match=says):
+            read_mesh("body", path, dim=dim)
+    else:
+        read_mesh("body", path, dim=dim)
