@@ -172,5 +172,6 @@ def _check_held(mesh: Mesh, held: Array) -> None:
             what = "the body" if parts.max() == 0 else f"part {part + 1} of {parts.max() + 1} that share no node"
             count = int(in_part.any(axis=1).sum())
             raise InputError(
-                f"{mesh.who}: {count} clamped nodes leave {what} free to move or turn: R_u is singular - clamp a face"
+                f"{mesh.who}: {count} clamped nodes leave {what} free to move or turn: R_u is singular"
+                " - clamp a face, or fix more of its components"
             )

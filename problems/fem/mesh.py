@@ -59,14 +59,20 @@ class Mesh:
         named = self.skfem_mesh.subdomains or {}
         return {str(name): np.asarray(cells) for name, cells in named.items() if not str(name).startswith("gmsh:")}
 
-    def boundary(self, where: str) -> Facets:
-        """Boundary facets by name: top, z=0.5, or a name in the mesh file. Raises InputError."""
+    def boundary(self, where: str, surface: bool = False) -> Facets:
+        """Facets by name: top, z=0.5, or a name in the mesh file; with `surface` none inside. Raises InputError."""
         facets = self.boundaries.get(where)
         if facets is None:
             facets = self._on_plane(where)
         if not facets.size:
             raise InputError(f"{self.who}: no facet of the surface lies on {where} - {self._choices()}")
-        cells = self.skfem_mesh.f2t[0, facets]
+        cells, behind = self.skfem_mesh.f2t[:, facets]
+        inside = int((behind != -1).sum())
+        if surface and inside:
+            raise InputError(
+                f"{self.who}: {inside} of {len(facets)} facets of {where} lie inside the body, where a load has no side"
+                " - name a part of its surface"
+            )
         return Facets.of(self.geometry, cells, (self.skfem_mesh.t2f[:, cells] == facets).argmax(axis=0))
 
     def _on_plane(self, where: str) -> Array:

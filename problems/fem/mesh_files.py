@@ -72,8 +72,9 @@ def _kind_of_cells(who: str, path: str | Path, found: Any, dim: int) -> str:
     known = MESHIO_CELLS[dim]
     kinds = [kind for kind in found.cells_dict if not kind.startswith(LOWER_DIMENSIONAL[dim])]
     if len(kinds) != 1 or kinds[0] not in known:
-        has = ", ".join(found.cells_dict) or "no cells"
-        raise InputError(f"{who}: mesh={path} has {has} - it needs cells of one kind out of {', '.join(known)}")
+        has, of = ", ".join(found.cells_dict) or "no cells", max((block.dim for block in found.cells), default=0)
+        what = f"has {has}" if of in (0, dim) else f"is of dimension {of} ({has}), not {dim}"
+        raise InputError(f"{who}: mesh={path} {what} - it needs cells of one kind out of {', '.join(known)}")
     return str(kinds[0])
 
 

@@ -32,6 +32,7 @@ from gradient_routes.problems.mechanics.design_variables import (
     DesignVariables,
     Setup,
 )
+from gradient_routes.problems.mechanics.in_words import load_in_words, support_in_words
 from gradient_routes.problems.mechanics.load_direction import load_direction
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.mechanics.measured_boundary import force_data, forces, in_words, measured_nodes
@@ -77,7 +78,7 @@ class Solid(Problem):
                 f"{self.name}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad"
             )
         law.check(law.of_modulus(1.0, o.nu))
-        top, known, gripped = mesh.boundary(o.loaded), measured_nodes(mesh, o), o.load == "displacement"
+        top, known, gripped = mesh.boundary(o.loaded, surface=True), measured_nodes(mesh, o), o.load == "displacement"
         self.log = o.parametrization != "raw"
         springs = Springs.on(mesh, o.clamped, self.log) if o.support == "springs" else None
         supported = known if springs is None else springs.facets.node_set
@@ -151,8 +152,7 @@ class Solid(Problem):
         if found is not None:
             apart = np.union1d(clamp, nodes_of_faces(mesh, o.clamped))
             self.data, said = self._from_file(found, F, apart)
-            self.read_as = (*found.notes, *said, *self._load_in_words(o.loaded))
-            self.notes += self.read_as
+            self.read_as = (*found.notes, *said)
             told = o.modulus is not None or (self.constants is not None and bool({*self.constants.start} - {"nu"}))
             self.start_from_data = not told and o.unknown in FITTED and (not gripped or F is not None)
         elif o.markers:
@@ -162,13 +162,21 @@ class Solid(Problem):
             where = o.sensors or ("right" if gripped else o.loaded)
             nodes = np.unique(mesh.geometry.nodes) if where == "everywhere" else mesh.boundary(where).node_set
             self.data = self._without_file(probes.at_nodes(mesh, nodes))
+        if o.mesh or measured:
+            how = "on springs" if springs else "at measured displacements" if known.size else "held"
+            words = support_in_words(mesh, o.clamped, o.fixed, how)
+            applied = () if gripped and known.size else (load_in_words(self.solid, o.loaded),)
+            self.read_as = (*self.read_as, words, *applied)
+            self.notes += self.read_as
         self.data = self.data.with_motion(o.motion)
         if gripped:
             self.drive = "displacement"
         elif known.size:
             self.drive = "load and displacement"
         if self.data.reads_nothing():
-            raise InputError(f"{self.name}: all sensors sit on clamped nodes and read zero - choose other points")
+            raise InputError(
+                f"{self.name}: all that is measured is held at zero and tells nothing - choose other points"
+            )
 
     def _by_file(self, loads: LoadCases, amplitude: float, direction: Array, area: float) -> tuple[float, Array]:
         """The amplitude and the directions (cases, d) of a file's load cases."""
@@ -212,19 +220,6 @@ class Solid(Problem):
         target = tuple(height[:, None] * direction for direction in self.solid.directions)
         cases = (points,) * len(self.solid.directions)
         return DisplacementData(self.solid, cases, None if self.synthetic else target, self.noise)
-
-    def _load_in_words(self, face: str) -> tuple[str, ...]:
-        """What is applied, for a user who has measured it: of several cases, in the one of the largest load."""
-        solid = self.solid
-        if solid.load != "traction":
-            return ()
-        k = int(np.linalg.norm(solid.directions, axis=1).argmax())
-        F = solid.dead_forces(solid.base, k, np).sum(axis=(0, 1))
-        area = float(solid.loaded.areas(self.mesh.geometry.X, np).sum())
-        resultant = ", ".join(f"{f:.4g}" for f in np.where(np.abs(F) > 1e-12 * np.abs(F).max(), F, 0.0))
-        what = f"load of case {k + 1}" if len(solid.directions) > 1 else "load"
-        t = float(solid.base.load * np.linalg.norm(solid.directions[k]))
-        return (f"{what}: {t:.4g} Pa on {face}, {area:.4g} m^2, in all ({resultant}) N",)
 
     def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: AnyDesign) -> Prior:
         """Neighbours are cells that share a facet, and adjacent layers."""

@@ -272,7 +272,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"components": "in-plane"}, "components needs markers"),
     ({"load": "displacement", "traction": 9.0}, "traction does not go with load=displacement"),
     ({"loaded": "bottom"}, "all its nodes are clamped"),
-    ({"sensors": "bottom"}, "read zero"),
+    ({"sensors": "bottom"}, "held at zero and tells nothing"),
+    ({"markers": 3, "face": "bottom"}, "held at zero and tells nothing"),
     ({"nx": 10**9}, "at most"),
     ({"law": "mooney-rivlin", "nu": 0.1}, "c = "),
     ({"derivatives": "hand", "law": "ogden"}, "not ogden"),
@@ -340,7 +341,7 @@ def test_data_a_thousand_times_off_are_warned_of(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "cells", "moved", "says"),
     [
-        ("triangle", [[0, 1, 2]], None, "has triangle"),
+        ("triangle", [[0, 1, 2]], None, "is of dimension 2 \\(triangle\\), not 3"),
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], None, ""),
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [0.1, 0.1, 0.1], "folded over a neighbour"),
         ("tetra", [[0, 1, 2, 3], [1, 2, 3, 4]], [1 / 3, 1 / 3, 1 / 3], "flat, inside out"),

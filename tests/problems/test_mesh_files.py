@@ -184,3 +184,21 @@ def test_unmerged_seams_and_hanging_nodes_are_refused(
             read_mesh("body", path, dim=dim)
     else:
         read_mesh("body", path, dim=dim)
+
+
+def test_faces_are_told_and_those_inside_carry_no_load(tmp_path: Path) -> None:
+    mesh, entities = body("quad8")
+    middle = in_order(rectangle_mesh("plate", "quad8", (2, 2), (1, 1)), "bottom")
+    at = {tuple(x): i for i, x in enumerate(mesh.geometry.X)}
+    raised = np.vectorize(lambda i: at[mesh.geometry.X[i][0], 0.5])(middle)
+    entities[0] = (1, "line3", raised, (1,))  # across the body
+    path = msh(tmp_path / "inside.msh", "4.1", mesh.geometry.X, entities)
+    held = Plate(mesh=path, clamped="foot", loaded="painted", thickness=0.1, derivatives="hand")
+    assert held.read_as == (
+        "held: foot, 0.1 m^2 in 2 facets",
+        "load: 0.2 Pa on painted, 0.2 m^2 in 4 facets, in all (0, 0.04) N",
+    )
+    with pytest.raises(InputError, match="2 of 2 facets of foot lie inside the body"):
+        Plate(mesh=path, clamped="lid", loaded="foot")
+    with pytest.raises(InputError, match=r"is of dimension 2 \(line3, quad8\), not 3"):
+        Block(mesh=path)

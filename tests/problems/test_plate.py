@@ -377,11 +377,11 @@ def test_bad_options_of_a_plate_are_one_line(options: dict[str, Any], says: str)
 @pytest.mark.parametrize(
     ("kind", "points", "cells", "says"),
     [
-        ("hexahedron", np.array(list(np.ndindex(2, 2, 2))), [[0, 4, 6, 2, 1, 5, 7, 3]], "has hexahedron - it needs"),
+        ("hexahedron", np.array(list(np.ndindex(2, 2, 2))), [[0, 4, 6, 2, 1, 5, 7, 3]], "is of dimension 3"),
         ("quad", [[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 1]], [[0, 1, 2, 3]], "is not plane: z from 0 to 1"),
         ("quad", [[-1, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]], "x goes from -1 m"),
         ("quad", [[0, 0, 0], [1, 0, 0], [0.2, 0.2, 0], [0, 1, 0]], [[0, 1, 2, 3]], "1 of 1 cells are flat"),
-        ("line", [[0, 0, 0], [1, 0, 0]], [[0, 1]], "has line"),
+        ("line", [[0, 0, 0], [1, 0, 0]], [[0, 1]], "is of dimension 1"),
     ],
 )
 def test_meshes_that_are_no_plates_are_refused(kind: str, points: Any, cells: Any, says: str, tmp_path: Path) -> None:
