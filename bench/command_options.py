@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 STORE = Path("results") / "routes.sqlite"
 FINISHED = "what is finished is printed, and kept unless --no-store"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (in quotes: [ and | are special to shells) or all. May be repeated."
-AT = "Point p of the gradient; a file has a header line and n_p values in one column."
+AT = (
+    "Point p of the gradient; a file has a header line and n_p values in one column, or names and values as invert -o,"
+    " run --gradient and export --table estimates write them."
+)
 LINEAR_SOLVERS = [*points()]
 NEWTONS = ["auto", "full", "inexact"]
 ITERATIVE = "Linear solver; krylov and descent are iterative, for any matrix, and stop at --rtol."

@@ -356,6 +356,10 @@ class Problem:
         """The prior, theta (n_p,) at p, and dtheta_i/dp_i (n_p,); None where there can be no prior."""
         return None
 
+    def completed(self, given: Mapping[str, float]) -> Array | None:
+        """p (n_p,) of which only some components are given, by name; None where they do not tell the others."""
+        return None
+
     def reference(self, p: Array) -> Reference | None:
         """A gradient by other means (a closed form), or None."""
         return None

@@ -12,8 +12,8 @@ from gradient_routes.bench.cases import declared, options, registry, selector
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
+from gradient_routes.bench.cases.point_file import read_point
 from gradient_routes.bench.cases.settings import Settings
-from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters, Problem
 from gradient_routes.routes.measured_start import with_measured_start
@@ -173,7 +173,7 @@ def _grids(kind: registry.Kind, text: str) -> list[selector.Selector]:
 
 
 def point(problem: Problem, at: str) -> Array:
-    """p (n_p,) for `start`, `true` or a CSV file of one column. Raises InputError, DomainError."""
+    """p (n_p,) for `start`, `true` or a CSV file, see `read_point`. Raises InputError, DomainError."""
     if at == "start":
         return problem.parameters.check(problem.parameters.start.copy(), f"{problem.name}, start")
     if at == "true":
@@ -181,10 +181,7 @@ def point(problem: Problem, at: str) -> Array:
         if truth is None:
             raise InputError(f"{problem.name}: the true parameters are not known - use --at start or --at FILE.csv")
         return problem.parameters.check(truth, f"{problem.name}, true")
-    columns = read_columns(at, None, folder=located(""))
-    if len(columns) != 1:
-        raise InputError(f"{at}: has {len(columns)} columns - --at reads one, with a header line")
-    return problem.parameters.check(next(iter(columns.values())), at)
+    return problem.parameters.check(read_point(problem, at), at)
 
 
 def sized(spec: ProblemSpec, at: str) -> tuple[int, int]:

@@ -153,7 +153,7 @@ class NumberFile:
     def _all_at_once(self, rows: list[str], places: Sequence[int], gaps: Sequence[bool] = (False,)) -> Array | None:
         """None unless all cells are finite numbers, or NaN in the columns with gaps."""
         try:
-            found = np.loadtxt(rows, delimiter=self.separator, usecols=places, ndmin=2, comments=None).T
+            found = np.loadtxt(rows, delimiter=self.separator, usecols=places, ndmin=2, comments=None, quotechar='"').T
         except ValueError:
             return None
         read = np.isfinite(found) | (np.isnan(found) & np.array(gaps)[:, None])

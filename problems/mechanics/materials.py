@@ -5,7 +5,7 @@ LAWS lists them by name. The energies themselves are in `energies`, which import
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +34,7 @@ class MaterialLaw:
                 (nu < 0), W has no lower bound for J to 0
     of_modulus  (E, nu) -> q with the small-strain moduli of Young's modulus E and Poisson's ratio nu, linear in E,
                 which may be a number or an array of NumPy or jax.numpy, real or complex
+    of_volume   (q without its last, nu) -> the last of q, so that Poisson's ratio at small strain is nu
     numpy       hand-derived derivatives in NumPy, if there are any
     energy      () -> W in jax.numpy, the same object at every call; None: the one of this name in `energies`
     """
@@ -42,6 +43,7 @@ class MaterialLaw:
     constants: tuple[str, ...]
     positive: tuple[bool, ...]
     of_modulus: Callable[[Any, float], tuple[Any, ...]]
+    of_volume: Callable[[Sequence[Any], float], Any]
     numpy: NumpyMaterial | None = None
     energy: Callable[[], Energy] | None = None
 
@@ -94,13 +96,49 @@ def ogden_q(E: Any, nu: float) -> tuple[Any, Any, Any, Any]:
     return MU[0] * scale, MU[1] * scale, MU[2] * scale, bulk(E, nu)
 
 
+def of_shear(modulus: Callable[[Any, float], Any], mu: Any, nu: float) -> Any:
+    """lam or kappa [Pa] from the shear modulus and Poisson's ratio."""
+    return modulus(2.0 * mu * (1.0 + nu), nu)
+
+
+def second_lame(E: Any, nu: float) -> Any:
+    """lam [Pa]."""
+    return lame(E, nu)[1]
+
+
 LAWS: dict[str, MaterialLaw] = {
     law.name: law
     for law in (
-        MaterialLaw("neo-hookean", ("mu", "lam"), (True, False), lame, NEO_HOOKEAN),
-        MaterialLaw("mooney-rivlin", ("c1", "c2", "c"), (True,) * 3, mooney_rivlin_q, MOONEY_RIVLIN),
-        MaterialLaw("yeoh", ("c1", "c2", "c3", "kappa"), (True, False, True, True), yeoh_q),
-        MaterialLaw("ogden", ("mu1", "mu2", "mu3", "kappa"), (True, True, False, True), ogden_q),
-        MaterialLaw("linear", ("mu", "lam"), (True, False), lame),
+        MaterialLaw(
+            "neo-hookean",
+            ("mu", "lam"),
+            (True, False),
+            lame,
+            lambda q, nu: of_shear(second_lame, q[0], nu),
+            NEO_HOOKEAN,
+        ),
+        MaterialLaw(
+            "mooney-rivlin",
+            ("c1", "c2", "c"),
+            (True,) * 3,
+            mooney_rivlin_q,
+            lambda q, nu: of_shear(second_lame, 2.0 * (q[0] + q[1]), nu) / 2.0 - 2.0 * q[1],
+            MOONEY_RIVLIN,
+        ),
+        MaterialLaw(
+            "yeoh",
+            ("c1", "c2", "c3", "kappa"),
+            (True, False, True, True),
+            yeoh_q,
+            lambda q, nu: of_shear(bulk, 2.0 * q[0], nu),
+        ),
+        MaterialLaw(
+            "ogden",
+            ("mu1", "mu2", "mu3", "kappa"),
+            (True, True, False, True),
+            ogden_q,
+            lambda q, nu: of_shear(bulk, sum(m * a for m, a in zip(q, ALPHA, strict=True)) / 2.0, nu),
+        ),
+        MaterialLaw("linear", ("mu", "lam"), (True, False), lame, lambda q, nu: of_shear(second_lame, q[0], nu)),
     )
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -54,6 +54,7 @@ if TYPE_CHECKING:
 
 TARGET = 0.2  # displacement wanted at the top, per height
 NEARLY_INCOMPRESSIBLE = 0.495
+NEARLY_CONSTANT_VOLUME = 0.45
 
 
 class Solid(Problem):
@@ -324,6 +325,22 @@ class Solid(Problem):
         other.parameters = replace(self.parameters, start=start, scale=scale)
         other.regularization = other._prior(self.alpha, o["phi"], o["phi_width"], o["unknown"])
         return other
+
+    def completed(self, given: Mapping[str, float]) -> Array | None:
+        """Constants of the law by name, of a material of constant volume: the last of them is told by nu.
+
+        Raises InputError for nu that is far from constant volume.
+        """
+        law, nu = self.solid.law, self._options["nu"]
+        if self._options["unknown"] != "constants" or set(given) != set(law.constants[:-1]):
+            return None
+        if nu < NEARLY_CONSTANT_VOLUME:
+            raise InputError(
+                f"{self.name}: the constants {', '.join(given)} are of a material of constant volume, beside nu={nu:g}"
+                f" - set nu={NEARLY_CONSTANT_VOLUME:g} or more, it tells {law.constants[-1]}"
+            )
+        q = [given[name] for name in law.constants[:-1]]
+        return np.array([*q, law.of_volume(q, nu)])
 
     @property
     def _is_log(self) -> bool:

@@ -14,6 +14,7 @@ from commands import Ran
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.data import csv
+from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.data.probes import Measured, groups, read_probes
 from gradient_routes.problems.data.table import Table, read_table
 from gradient_routes.problems.data.units import UNITS, factor, quantity, zero
@@ -457,6 +458,13 @@ def test_bad_columns_and_units_end_with_one_line(options: str, cli: Callable[...
         2,
         "routes: --units: no --problem reads a file - write --problem 'NAME[data=FILE]'\n",
     )
+
+
+def test_a_quoted_separator_moves_no_column(file: File) -> None:
+    path = file('remark,node,displacement\n"left, again",2,0.5\n"right, once",3,0.7\n')
+    found = read_columns(path, ("node", "displacement"))
+    np.testing.assert_array_equal(found["node"], [2.0, 3.0])
+    np.testing.assert_array_equal(found["displacement"], [0.5, 0.7])
 
 
 def test_a_mesh_in_mm_and_one_in_m_with_data_in_mm_are_one_problem(file: File, tmp_path: Path) -> None:

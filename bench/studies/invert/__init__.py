@@ -27,7 +27,10 @@ AT_NOISE = "End at the first step that meets the data to their noise: the discre
 LINEAR = "One linear solve in place of an iteration: the map from readings to p, about the start."
 MAP = "A map that -o has saved, in place of --problem."
 FRAMES = "Readings to apply it to: CSV with a column a reading and a row a frame, or .npz with one array."
-OUTPUT = f"FILE.npz: the map. FILE.csv: p of every frame. {replaces('.npz or .csv')}"
+OUTPUT = (
+    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; with --linear p of every frame. FILE.npz: the"
+    f" map of --linear. {replaces('.npz or .csv')}"
+)
 RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")
 
@@ -87,7 +90,7 @@ STUDY = Study(
             lambda given: given["alpha_sweep"] is None,
             "is of a single inversion, not of an --alpha-sweep",
         ),
-        Rule(("saved_map", "frames", "output"), lambda given: given["linear"], "is of --linear"),
+        Rule(("saved_map", "frames"), lambda given: given["linear"], "is of --linear"),
         Rule(
             ("optimizer", "iterations", "positive", "minibatch", "resume", "stop_at_noise"),
             lambda given: not given["linear"],

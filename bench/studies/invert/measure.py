@@ -24,6 +24,8 @@ from gradient_routes.bench.inversion.optimizers import Limits, Name, check_noise
 from gradient_routes.bench.inversion.resumed import last_estimate
 from gradient_routes.bench.inversion.tradeoff import trade_off
 from gradient_routes.bench.inversion.variables import Positive, Variables
+from gradient_routes.bench.store.output_files import Output, read_by
+from gradient_routes.bench.studies.invert import estimates_csv
 from gradient_routes.bench.studies.invert.linear import by_map
 from gradient_routes.bench.studies.invert.messages import Begun, Compared, Ended, LCurve, Taken, Trades
 from gradient_routes.bench.studies.options import one_problem
@@ -68,11 +70,19 @@ def run(
     if resume and kept is None:
         raise InputError("--resume: reads a store, with --no-store there is none - leave one of them out")
     engine = Engine(optimizer, Limits(iterations, tolerance, rate, stop_at_noise), solver, positive)
+    if len(output) > 1:
+        raise InputError(f"-o {output[1]}: the second file - estimates go into one")
+    files = [Output("-o", path, (".csv",)) for path in output]
+    for file in files:
+        file.check([*([] if kept is None else [kept]), *read_by(selector, at)])
     asked = Run(say, one_problem(selector), case.routes(routes), engine, at)
     if alpha_sweep is None:
         asked.each(kept if resume else None, minibatch, seed)
     else:
         asked.sweep(alpha_sweep, draws)
+    for file in files if asked.found else ():
+        estimates_csv.write(file, asked.found)
+        say(Note(f"estimates in {file.path}", result=True))
     if asked.failure is not None:
         raise asked.failure
     return 1 if asked.misled else 0
@@ -87,6 +97,7 @@ class Run:
         self.say, self.spec, self.routes, self.engine, self.at = say, spec, routes, engine, at
         self.failure: BaseException | None = None
         self.misled = False
+        self.found: list[Inversion] = []
 
     def each(self, resumed: Path | None, minibatch: int | None, seed: int) -> None:
         """Route by route, from where each ended in the store `resumed` if given; then the cost of each."""
@@ -97,6 +108,7 @@ class Run:
             starts = [last_estimate(resumed, self.spec, r, self.engine.optimizer, self.at) for r in self.routes]
         one_shot = self._one_shot(problem)
         done = self._until_it_ends(self._inversions(problem, starts, minibatch, seed, one_shot))
+        self.found = done
         kept = [found.tables for found in done]
         for table in ("inversion", "estimates", "constants", "fit", "residuals"):
             for tables in kept:
@@ -158,6 +170,7 @@ class Run:
             further = self._swept(between(self.spec, route, self.engine, points, self.at))
             points = l_curve(swept, self._until_it_ends(further, least=0))
         best = next((point for point in points if point.chosen), points[-1]).inversion
+        self.found = [best]
         self._tell(best.made)
         self._warn(best)
         self._judge([point.inversion for point in points])
