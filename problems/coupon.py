@@ -23,6 +23,7 @@ from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
 from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.homogeneous import MODES, States
+from gradient_routes.problems.mechanics.stability import STRETCHES, stable_range
 from gradient_routes.problems.problem import (
     Array,
     End,
@@ -271,7 +272,27 @@ class Coupon(Problem):
         rss, m = off @ off, len(off)
         if rss > 0.0:
             said.append(f"AIC = {m * np.log(rss / m) + 2 * (len(p) + 1):.1f}: of several laws the least is the best")
-        return ParameterView(remarks=tuple(said))
+        return ParameterView(remarks=(*said, *self._stability(p)))
+
+    def _stability(self, p: Array) -> list[str]:
+        """Of every mode, measured or not."""
+        if self.law.name == "linear":
+            return []
+        q, said = np.append(p, np.zeros(int(self.incompressible))), []
+        for mode in MODES:
+            found = stable_range(lambda H: self._principal(H, q), mode, self.incompressible)
+            where = "at no stretch" if found is None else f"at stretches {found[0]:.3g} to {found[1]:.3g}"
+            said.append(f"{mode}: stable {where}, of {STRETCHES[0]:g} to {STRETCHES[-1]:g}")
+        return said
+
+    def _principal(self, H: Array, q: Array) -> Array:
+        """P_i (m, 3) of diagonals of H (m, 3), as many at a time as there are data: of that size it is compiled."""
+        turned = np.concatenate([np.roll(H, -i, axis=1) for i in range(3)])  # P_11 is the first of a turned H
+        pieces = -(-len(turned) // self.n_state)
+        padded = np.zeros((pieces * self.n_state, 3))
+        padded[: len(turned)] = turned
+        P = [np.asarray(self.stress.basis(some))[:, 0] @ q for some in np.split(padded, pieces)]
+        return np.concatenate(P)[: len(turned)].reshape(3, -1).T
 
 
 def _check(asked: list[str], law: str, incompressible: bool, nu: float, stretch: float, points: int, seed: int) -> None:

@@ -138,7 +138,8 @@ class Inversion:
         rows = [self.shared | asdict(iterate) | {"ending_solves": None} for iterate in self.iterates]
         rows[last]["ending_solves"] = self.ending_solves
         doubt = self.fit.residuals.described.replace("\n", "; ") if self.fit is not None and self.unexplained else None
-        rows[last]["says"] = "; ".join(filter(None, (rows[last]["says"], self.end, self.linear_regime, doubt)))
+        says = (rows[last]["says"], self.end, self.linear_regime, doubt, *self.view.remarks)
+        rows[last]["says"] = "; ".join(filter(None, says))
         found = {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}
         if self.fit is None:
             return found

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import ROOT, relative_error
+from scipy.optimize import brentq
 from test_materials import STRESS
 
 from gradient_routes.bench.cases.case import problems, routes
@@ -17,7 +18,8 @@ from gradient_routes.bench.inversion.optimizers import Limits
 from gradient_routes.problems.coupon import Coupon
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.mechanics.homogeneous import MODES
-from gradient_routes.problems.mechanics.materials import ALPHA
+from gradient_routes.problems.mechanics.materials import ALPHA, LAWS
+from gradient_routes.problems.mechanics.stability import stable_range
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
@@ -101,6 +103,34 @@ def test_every_combination_of_curves_gives_its_constants_back(law: str, volume: 
             assert ended.p.sum() == pytest.approx(made.truth().sum(), rel=1e-9)
         else:
             np.testing.assert_allclose(ended.p, made.truth(), rtol=1e-6, err_msg=mode)
+
+
+def test_a_law_is_stable_as_far_as_its_curve_rises_and_drucker_s_work_is_positive() -> None:
+    """Yeoh's law with c2 = -c1/10, in tension up to the largest stress, in compression up to that of lambda P."""
+    coupon, q = Coupon(mode="uniaxial+shear", law="yeoh", points=M // 2), np.array([1.0, -0.1, 0.0, 0.0])
+    i1 = np.polynomial.Polynomial([2.0, -3.0, 0.0, 1.0])  # lambda (I1 - 3) = lambda^3 - 3 lambda + 2
+
+    def P(lam: float) -> float:
+        return 2.0 * (lam - lam**-2.0) * (1.0 - 0.2 * i1(lam) / lam)
+
+    def slope(f: Any, lam: float) -> float:
+        return float((f(lam + 1e-5) - f(lam - 1e-5)) / 2e-5)
+
+    least = brentq(lambda lam: slope(lambda x: x * P(x), lam), 0.2, 0.9)
+    most = brentq(lambda lam: slope(P, lam), 1.1, 3.0)
+    found = stable_range(lambda H: coupon._principal(H, q), "uniaxial", incompressible=True)
+    np.testing.assert_allclose(found, (least, most), rtol=np.log(100.0) / 199 * 1.01)  # a step of the stretches tried
+    assert stable_range(lambda H: coupon._principal(H, -q), "uniaxial", incompressible=True) is None
+
+
+def test_stability_of_a_compressible_law_is_that_of_a_nearly_incompressible_one() -> None:
+    law, coupon = LAWS["mooney-rivlin"], Coupon(mode="uniaxial", law="mooney-rivlin", points=M)
+    q = np.array(law.of_modulus(1.0, 0.4999))
+    q[1] = -0.05 * q[0]  # softens in equibiaxial tension
+    for mode in MODES:
+        one, other = (stable_range(lambda H: coupon._principal(H, q), mode, closed) for closed in (True, False))
+        assert (one is None, other is None) == (False, False)
+        np.testing.assert_allclose(one, other, rtol=0.05, err_msg=mode)
 
 
 def curve(folder: Path, text: str) -> str:
