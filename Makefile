@@ -29,9 +29,20 @@ demo: $(READY) ## install into .venv, then all seven routes on the bar
 
 STEEL = plate[body=hole,nx=16,ny=4,size=0.08,0.02,radius=0.004,element=quad8,law=linear,unknown=constants,clamped=left,loaded=right,direction=normal,traction=106.2629e6,data=examples/measured/steel_plate.csv,noise=0.4um
 
-measured: $(READY) ## a published measurement to E and nu: flagged without the motion of the specimen, then with it
+RUBBER = data=examples/measured/rubber.csv,noise=5kPa
+ROD = rod[data=examples/measured/cooled_rod.csv,length=400mm,diameter=12mm,conductivity=110,base=85degC,ambient=21.5degC,noise=0.1K
+
+measured: $(READY) ## measurements to constants, wrong models flagged: a published steel plate, rubber curves to a block, a cooled rod
 	-$(BIN)/routes invert --problem '$(STEEL)]' --optimizer gauss-newton --no-plot
 	$(BIN)/routes invert --problem '$(STEEL),motion=rigid]' --optimizer gauss-newton --no-plot
+	$(BIN)/routes identify --problem 'coupon[law=yeoh,$(RUBBER)]' --no-plot
+	-for law in neo-hookean mooney-rivlin ogden; do $(BIN)/routes invert --problem "coupon[law=$$law,$(RUBBER)]" --optimizer gauss-newton --no-plot; done
+	$(BIN)/routes invert --problem 'coupon[law=yeoh,$(RUBBER)]' --optimizer gauss-newton --no-plot -o results/rubber_constants.csv
+	$(BIN)/routes run --problem 'block[law=yeoh,nu=0.49,unknown=constants,traction=2e5]' --at results/rubber_constants.csv --route adjoint --vtu results/rubber_block.vtu
+	$(BIN)/routes identify --problem '$(ROD),parts=2]' --no-plot
+	-$(BIN)/routes invert --problem '$(ROD)]' --no-plot
+	$(BIN)/routes invert --problem '$(ROD),parts=2]' --no-plot
+	$(BIN)/routes report -o results/report.html
 
 test: $(READY) ## install into .venv, then the tests
 	$(BIN)/python -m pytest -n 3 --dist worksteal
