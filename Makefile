@@ -96,6 +96,7 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.large
 	$(BIN)/python -m benchmarks.loads
 	$(BIN)/python -m benchmarks.intervals
+	$(BIN)/python -m benchmarks.starts
 	$(BIN)/python -m benchmarks.data_files
 	$(BIN)/python -m benchmarks.error_bars
 	$(BIN)/python -m benchmarks.adapter_overhead

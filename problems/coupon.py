@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -49,6 +50,7 @@ class Coupon(Problem):
 
     name = "coupon"
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
+    from_rest = True
     regularization: Prior
 
     def __init__(
@@ -108,7 +110,12 @@ class Coupon(Problem):
         stated = None if constants is None else Constants.parse(constants, LAWS[law], "coupon", self.incompressible)
         self.constants = stated
         fitted = modulus is None and data is not None and not (stated and {*stated.start} - {"nu"})
-        E = self._fitted() if fitted else 1.0 if modulus is None else modulus
+        tells = None if data is None else self._fitted()
+        if fitted and tells is None:
+            raise InputError(
+                "coupon: stresses and stretches of the data do not go together - tension is > 0, at stretch > 1"
+            )
+        E = modulus if modulus is not None else tells if fitted and tells else 1.0
         if not 1e-30 <= E <= 1e30:
             raise InputError(f"coupon: modulus={E:g} Pa - choose one from 1e-30 to 1e30")
         if data is not None and (fitted or modulus is not None):
@@ -119,9 +126,10 @@ class Coupon(Problem):
         self.law.check(tuple(q))
         self.n_param = len(q) - self.incompressible
         start = q[: self.n_param]
+        scale = np.abs(start) * (tells or E) / E  # of the data, wherever the start is
         self.parameters = Parameters(
             start=start,
-            scale=np.abs(start),
+            scale=scale,
             lower=np.where(self.law.positive[: self.n_param], 0.0, -np.inf),
             unit="Pa",
             label=self.law.constants.__getitem__,
@@ -135,16 +143,14 @@ class Coupon(Problem):
         self.read_as = (*self.read_as, *blind) if data is not None else self.read_as
         self.notes = self.read_as if data is not None else blind
 
-    def _fitted(self) -> float:
-        """E of the incompressible neo-Hookean curves E/3 (lambda - t^2/lambda) with the least |P_11 - d|^2."""
+    def _fitted(self) -> float | None:
+        """E of the incompressible neo-Hookean curves E/3 (lambda - t^2/lambda) with the least |P_11 - d|^2; None if it
+        is not > 0.
+        """
         lam = self.states.stretch
         f = (lam - (1.0 + self.states.isochoric) ** 2 / lam) / 3.0
         d = self._data()
-        if not f @ d > 0.0:
-            raise InputError(
-                "coupon: stresses and stretches of the data do not go together - tension is > 0, at stretch > 1"
-            )
-        return float(f @ d / (f @ f))
+        return float(f @ d / (f @ f)) if f @ d > 0.0 else None
 
     # --- the equations
 
@@ -222,6 +228,17 @@ class Coupon(Problem):
 
         return Traced(residual=lambda u, p: self.residual(u, p, jnp), objective=lambda u, p: self.objective(u, p, jnp))
 
+    # --- a start of the size of the data
+
+    def scaled(self, p: Array, factor: float) -> Array | None:
+        """Of data, here stresses, 1 / factor times as large; None where p are not linear in them."""
+        return None if self.constants and self.constants.paired else p / factor
+
+    def stiffened(self, factor: float) -> Coupon:
+        other = copy.copy(self)
+        other.parameters = replace(self.parameters, start=self.parameters.start / factor)
+        return other
+
     # --- data
 
     def _data(self) -> Array:
@@ -278,7 +295,7 @@ class Coupon(Problem):
         """Of every mode, measured or not."""
         if self.law.name == "linear":
             return []
-        q, said = np.append(p, np.zeros(int(self.incompressible))), []
+        q, said = np.append(self._q(p), np.zeros(int(self.incompressible))), []
         for mode in MODES:
             found = stable_range(lambda H: self._principal(H, q), mode, self.incompressible)
             where = "at no stretch" if found is None else f"at stretches {found[0]:.3g} to {found[1]:.3g}"

@@ -272,7 +272,7 @@ def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Pro
         return problem, p, None
     other = problem.stiffened(c)
     other.regularization = problem.regularization  # J stays what it was
-    return other, q, f"the start is made {c:.3g} times as stiff, which fits the data best"
+    return other, q, f"the start is scaled to fit the data best, by a factor of {max(c, 1.0 / c):.3g}"
 
 
 def stopped(objective: Objective, says: str) -> Stop:

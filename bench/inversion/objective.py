@@ -47,13 +47,16 @@ def observed(problem: Problem, p: Array) -> Observation | None:
 
 
 def size_of_data(problem: Problem, p: Array) -> float:
-    """1/2 |d - S u_0|^2, which no start changes, where p is a stiffness or data are counted from rest; 0 elsewhere.
+    """1/2 |d - S u_0|^2 where p is a stiffness, 1/2 |d|^2 where data are counted from rest: no start changes either;
+    0 elsewhere.
 
     There d(S u) is about -S u for a natural change of all of p: the slope of a J that explains half of the data.
     Elsewhere data may be large and vary little, and nothing but the start tells a slope.
     """
     seen = None if problem.scaled(p, 1.0) is None and not problem.from_rest else observed(problem, p)
-    return 0.0 if seen is None else 0.5 * float(np.sum((seen.data - seen.predicted) ** 2))
+    if seen is None:
+        return 0.0
+    return 0.5 * float(np.sum((seen.data if problem.from_rest else seen.data - seen.predicted) ** 2))
 
 
 def noise_level(problem: Problem, p: Array) -> float:

@@ -188,8 +188,14 @@ def _check_need(file: NumberFile, group: Group, there: set[str]) -> None:
 
 
 def _check_mixed(path: str | Path, columns: Sequence[Column], units: Units) -> None:
-    """Raises InputError for one quantity in several units, unless the user has named the unit of each column."""
-    stated = {column.unit for column in columns if column.unit is not None}
+    """Raises InputError for a unit that is not known, and for one quantity in several units, unless the user has named
+    the unit of each column.
+    """
+    stated = {
+        column.unit: kind_of(column.unit, f"{path}: column {column.name}")
+        for column in columns
+        if column.unit is not None
+    }
     if len(stated) > 1 and not {column.name for column in columns} <= {*units.of_column}:
         pairs_ = [f"{column.name}:{column.unit or '?'}" for column in columns]
         raise InputError(

@@ -133,6 +133,28 @@ def test_stability_of_a_compressible_law_is_that_of_a_nearly_incompressible_one(
         np.testing.assert_allclose(one, other, rtol=0.05, err_msg=mode)
 
 
+@pytest.mark.parametrize("optimizer", ["gauss-newton", "lbfgs"])
+def test_any_start_and_any_unit_of_stress_give_the_same_constants_in_as_many_steps(
+    optimizer: Any, tmp_path: Path
+) -> None:
+    """L-BFGS called three times the constants converged: its tolerance was relative to the slope at the start."""
+    lam = np.linspace(1.1, 3.0, M)
+    i1, t = lam**2 + 2.0 / lam - 3.0, lam**-0.5
+    P = 2.0 * (lam - t**2 / lam) * (0.19e6 - 4e3 * i1 + 150.0 * i1**2)
+    P = P * (1.0 + 1e-3 * np.random.default_rng(0).standard_normal(M))
+    found = []
+    for unit, modulus in ((1.0, None), (1.0, 1.0), (1.0, 1e12), (1e6, None), (1e9, None)):
+        path = tmp_path / f"{unit:g}.csv"
+        np.savetxt(path, np.stack([lam, P / unit], 1), "%.17g", ",", header="stretch,stress", comments="")
+        given = "" if modulus is None else f",modulus={modulus}"
+        (spec,) = problems([f"coupon[law=yeoh,mode=uniaxial,data={path}{given}]"])
+        ended = invert(spec, routes(["adjoint"])[0], Engine(optimizer))
+        found.append((ended.p * unit, len(ended.iterates)))
+    for p, steps in found[1:]:
+        np.testing.assert_allclose(p, found[0][0], rtol=1e-6)
+        assert abs(steps - found[0][1]) <= 2
+
+
 def curve(folder: Path, text: str) -> str:
     path = folder / "curves.csv"
     path.write_text(text)

@@ -161,6 +161,11 @@ UNREADABLE: dict[str, tuple[str | bytes, str, dict[str, str]]] = {
         "column x: unit 'cm' is not known - the units are m, mm, um; Pa, kPa, MPa, GPa, N/mm2; N,",
         {},
     ),
+    "no such unit beside one": (
+        "x [mm],y [mm],z [mm],ux [furlong]\n1,2,3,4\n",
+        "ux: unit 'furlong' is not known - the units are m, mm, um;",
+        {},
+    ),
     "a unit of stress": (
         "x [MPa],y [MPa],z [MPa],ux\n1,2,3,4\n",
         "'MPa' is a unit of stress, not of length",
