@@ -72,6 +72,9 @@ def run(
     engine = Engine(optimizer, Limits(iterations, tolerance, rate, stop_at_noise), solver, positive)
     if len(output) > 1:
         raise InputError(f"-o {output[1]}: the second file - estimates go into one")
+    wrong = next((path for path in output if path.suffix.lower() != ".csv"), None)
+    if wrong is not None:
+        raise InputError(f"-o {wrong}: estimates are written as CSV - name it .csv; a map, .npz, is of --linear")
     files = [Output("-o", path, (".csv",)) for path in output]
     for file in files:
         file.check([*([] if kept is None else [kept]), *read_by(selector, at)])

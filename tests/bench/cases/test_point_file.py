@@ -31,6 +31,15 @@ def test_what_invert_and_run_and_export_write_is_read_again(cli, tmp_path: Path)
     np.testing.assert_array_equal(point(bar, str(files[2])), p)
 
 
+@pytest.mark.parametrize(
+    ("files", "says"),
+    [("-o m.npz", "-o m.npz: estimates are written as CSV - "), ("-o a.csv -o b.csv", "-o b.csv: the second file - ")],
+)
+def test_estimates_are_one_csv_file(files: str, says: str, cli) -> None:
+    ended = cli(*f"invert --problem bar --no-plot --no-store {files}".split())
+    assert (ended.code, says in ended.err) == (2, True)
+
+
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_constants_of_constant_volume_are_completed_by_nu(law) -> None:
     q = law.of_modulus(3.0, 0.47)
