@@ -28,8 +28,8 @@ LINEAR = "One linear solve in place of an iteration: the map from readings to p,
 MAP = "A map that -o has saved, in place of --problem."
 FRAMES = "Readings to apply it to: CSV with a column a reading and a row a frame, or .npz with one array."
 OUTPUT = (
-    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; with --linear p of every frame."
-    f" FILE.npz: the map of --linear. {replaces('.npz or .csv')}"
+    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; FILE.vtu: u and p on the mesh. With"
+    f" --linear p of every frame as CSV, and FILE.npz, the map. {replaces('file of its kind')}"
 )
 RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")

@@ -24,8 +24,8 @@ from gradient_routes.bench.inversion.optimizers import Limits, Name, check_noise
 from gradient_routes.bench.inversion.resumed import last_estimate
 from gradient_routes.bench.inversion.tradeoff import trade_off
 from gradient_routes.bench.inversion.variables import Positive, Variables
-from gradient_routes.bench.store.output_files import Output, read_by
-from gradient_routes.bench.studies.invert import estimates_csv
+from gradient_routes.bench.store.output_files import read_by
+from gradient_routes.bench.studies.invert import answer_files
 from gradient_routes.bench.studies.invert.linear import by_map
 from gradient_routes.bench.studies.invert.messages import Begun, Compared, Ended, LCurve, Taken, Trades
 from gradient_routes.bench.studies.options import one_problem
@@ -70,22 +70,14 @@ def run(
     if resume and kept is None:
         raise InputError("--resume: reads a store, with --no-store there is none - leave one of them out")
     engine = Engine(optimizer, Limits(iterations, tolerance, rate, stop_at_noise), solver, positive)
-    if len(output) > 1:
-        raise InputError(f"-o {output[1]}: the second file - estimates go into one")
-    wrong = next((path for path in output if path.suffix.lower() != ".csv"), None)
-    if wrong is not None:
-        raise InputError(f"-o {wrong}: estimates are written as CSV - name it .csv; a map, .npz, is of --linear")
-    files = [Output("-o", path, (".csv",)) for path in output]
-    for file in files:
-        file.check([*([] if kept is None else [kept]), *read_by(selector, at)])
+    files = answer_files.outputs(output, [*([] if kept is None else [kept]), *read_by(selector, at)])
     asked = Run(say, one_problem(selector), case.routes(routes), engine, at)
     if alpha_sweep is None:
         asked.each(kept if resume else None, minibatch, seed)
     else:
         asked.sweep(alpha_sweep, draws)
     for file in files if asked.found else ():
-        estimates_csv.write(file, asked.found)
-        say(Note(f"estimates in {file.path}", result=True))
+        say(Note(answer_files.write(file, asked.found, solver), result=True))
     if asked.failure is not None:
         raise asked.failure
     return 1 if asked.misled else 0

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 
@@ -33,11 +35,26 @@ def test_what_invert_and_run_and_export_write_is_read_again(cli, tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("files", "says"),
-    [("-o m.npz", "-o m.npz: estimates are written as CSV - "), ("-o a.csv -o b.csv", "-o b.csv: the second file - ")],
+    [
+        ("-o m.npz", "-o m.npz: a map, .npz, is of --linear - "),
+        ("-o a.csv -o b.csv", "-o b.csv: a second one - "),
+        ("--iterations 1 -o a.vtu", "-o a.vtu: bar has no mesh - take a .csv"),
+    ],
 )
-def test_estimates_are_one_csv_file(files: str, says: str, cli) -> None:
+def test_files_that_cannot_hold_the_answer_are_refused(files: str, says: str, cli) -> None:
     ended = cli(*f"invert --problem bar --no-plot --no-store {files}".split())
     assert (ended.code, says in ended.err) == (2, True)
+
+
+def test_the_answer_on_the_mesh(cli, tmp_path: Path) -> None:
+    """One modulus a layer, as the estimates say."""
+    plate = "plate[n=2,derivatives=hand,unknown=layers,layers=2,data=twin]"
+    files = [tmp_path / "p.csv", tmp_path / "p.vtu"]
+    ended = cli(*f"invert --problem {plate} --no-plot --no-store -o {files[0]} -o {files[1]}".split())
+    assert f"estimates in {files[0]}\nfields in {files[1]}" in ended.out
+    E = meshio.read(files[1]).cell_data["E"][0]
+    estimates = [float(row["estimate"]) for row in csv.DictReader(files[0].read_text().splitlines())]
+    np.testing.assert_allclose(sorted({*np.round(np.log(E), 12)}), sorted(estimates), atol=1e-11)  # of the roundings
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
