@@ -23,9 +23,9 @@ from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
 from gradient_routes.problems.dynamics.bar_step import BarStep
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
-from gradient_routes.problems.dynamics.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.recurrence import Recurrence
+from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Traced
 from gradient_routes.problems.transient import Transient
 

@@ -15,7 +15,8 @@ PACKAGE = ROOT / "gradient_routes"
 HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "vl_convert"}
 FLOORS = ("problems", "routes", "bench")
 # what routes may know of floor 1: the contract, no single problem
-CONTRACT = {"problem", "errors", "text", "matrices.tridiagonal", "matrices.sparse", "jax64"}
+MATRICES = {f"matrices.{kind}" for kind in ("tridiagonal", "sparse", "recurrence", "step_matrix")}
+CONTRACT = {"problem", "transient", "errors", "text", "jax64"} | MATRICES
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (
     *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "environments", "render"),

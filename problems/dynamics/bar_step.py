@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gradient_routes.problems.dynamics.step_matrix import StepMatrix
+from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Problem
 from gradient_routes.problems.transient import Beside
 

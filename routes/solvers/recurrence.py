@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.dynamics.step_matrix import StepMatrix
 from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.recurrence import Recurrence
+from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization
 
