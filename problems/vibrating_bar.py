@@ -111,8 +111,7 @@ class VibratingBar(Transient):
         self.row = self.mass[0] / dt
         self.skew = np.full(n - 1, c_g * self.mass[0] if damping == "skew" else 0.0)  # above the diagonal [kg/s]
         t = np.arange(steps + 1) * dt
-        self.load = np.zeros((steps + 1, n))  # [N]
-        self.load[:, -1] = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)
+        self.F = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)  # (T + 1,) [N]
         self.nodes = parse_nodes(sensors or list(range(n, 0, -2))[::-1], n, self.name)
         self.d: Array | None = None  # (T, m) [m]
         self._kept: tuple[Array, tuple[StepMatrix, StepMatrix]] | None = None
@@ -144,22 +143,21 @@ class VibratingBar(Transient):
 
     def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
         """R (T 2 N,) [N s]: what is left of the two rows of every step, see `Scheme`."""
-        return xp.reshape(self.rows(*self.history(u, xp), p, xp.asarray(self.load), xp), (self.n_state,))
+        return xp.reshape(self.rows(*self.history(u, xp), p, self.F, xp), (self.n_state,))
 
-    def rows(self, x: Any, v: Any, p: Any, load: Any, xp: Any = np) -> Any:
-        """R (m, 2, N) of m steps from displacements, velocities and loads (m + 1, N) before and after them."""
+    def rows(self, x: Any, v: Any, p: Any, F: Array, xp: Any = np) -> Any:
+        """R (m, 2, N) of m steps from displacements, velocities (m + 1, N) and F (m + 1,) before and after them."""
         h, scheme, k = self.h, self.scheme, self.stiffness(p, xp)
         moved = self.row * (x[1:] - x[:-1] - h * scheme.velocity(v))
-        driven = self.mass * (v[1:] - v[:-1]) + h * scheme.force(_spread(k * _elongation(x, xp), xp) - load)
+        driven = self.mass * (v[1:] - v[:-1]) + h * scheme.force(_spread(k * _elongation(x, xp), xp))
         if self.c_K:
             driven = driven + h * self.c_K * scheme.damping(_spread(k * _elongation(v, xp), xp))
         if self.c_M:
             driven = driven + h * self.c_M * self.mass * scheme.damping(v)
         if self.skew.any():
             driven = driven + h * scheme.damping(self._gyroscopic(v, xp))
-        if self.stop is not None:
-            pressed = h * scheme.force(self.stop.law.force(x[:, -1] - self.stop.gap, xp))
-            driven = xp.concatenate([driven[:, :-1], driven[:, -1:] + pressed[:, None]], axis=1)
+        pushed = -F if self.stop is None else self.stop.law.force(x[:, -1] - self.stop.gap, xp) - F
+        driven = xp.concatenate([driven[:, :-1], driven[:, -1:] + h * scheme.force(pushed)[:, None]], axis=1)
         return xp.stack([moved, driven], axis=1)
 
     def _gyroscopic(self, v: Any, xp: Any) -> Any:

@@ -53,9 +53,7 @@ class BarStep(Problem):
     def residual(self, u: Array, p: Array) -> Array:
         before, modulus = self._split(p)
         both = self._histories(u, before)
-        return np.asarray(
-            self.bar.rows(both[:, 0], both[:, 1], modulus, self.bar.load[self.t - 1 : self.t + 1]).ravel()
-        )
+        return np.asarray(self.bar.rows(both[:, 0], both[:, 1], modulus, self.bar.F[self.t - 1 : self.t + 1]).ravel())
 
     def tangent(self, u: Array, p: Array) -> StepMatrix:
         return self.bar.pressed_matrix(self.bar.step_matrices(self._split(p)[1])[0], u[self.bar.n - 1])
