@@ -3,40 +3,30 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gradient_routes.problems.data import probes
 from gradient_routes.problems.data.displacement_data import DisplacementData
-from gradient_routes.problems.data.load_cases import LoadCases
 from gradient_routes.problems.data.observation import Candidates, Observation
-from gradient_routes.problems.data.regularization import Phi, Prior
+from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered
-from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions, held_components, nodes_of_faces
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
-from gradient_routes.problems.mechanics import design_variables
+from gradient_routes.problems.mechanics.chosen_design import base_of, design_of
 from gradient_routes.problems.mechanics.constants import Constants
-from gradient_routes.problems.mechanics.design_variables import (
-    CELLWISE,
-    FIELDS,
-    FITTED,
-    MATERIAL,
-    MODULI,
-    AnyDesign,
-    DesignVariables,
-    Setup,
-)
-from gradient_routes.problems.mechanics.in_words import load_in_words, support_in_words
-from gradient_routes.problems.mechanics.load_direction import load_direction
+from gradient_routes.problems.mechanics.design_variables import FITTED, MATERIAL
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
-from gradient_routes.problems.mechanics.measured_boundary import force_data, forces, in_words, measured_nodes
-from gradient_routes.problems.mechanics.springs import Springs
+from gradient_routes.problems.mechanics.loading import Loading
+from gradient_routes.problems.mechanics.solid_data import data_of, read_file
+from gradient_routes.problems.mechanics.solid_fields import fields_of
+from gradient_routes.problems.mechanics.solid_notes import doubts, setting
+from gradient_routes.problems.mechanics.solid_prior import prior_of
+from gradient_routes.problems.mechanics.supports import Supports
 from gradient_routes.problems.problem import (
     Array,
     End,
@@ -52,8 +42,6 @@ from gradient_routes.problems.problem import (
 if TYPE_CHECKING:
     from gradient_routes.problems.mechanics.materials import MaterialLaw
 
-TARGET = 0.2  # displacement wanted at the top, per height
-NEARLY_INCOMPRESSIBLE = 0.495
 NEARLY_CONSTANT_VOLUME = 0.45
 
 
@@ -71,173 +59,52 @@ class Solid(Problem):
     def __init__(self, options: dict[str, Any], mesh: Mesh, law: MaterialLaw, directions: Array) -> None:
         """`options` of the problem, which its checks have passed; directions (cases, d) of its loads."""
         o = SimpleNamespace(**options)
-        self._options, self.mesh = options, mesh
-        exist = law.numpy is not None and o.unknown in MATERIAL and o.load != "follower"
-        use_numpy = exist if o.derivatives is None else o.derivatives == "hand"
-        if use_numpy and law.numpy is None:
-            raise InputError(
-                f"{self.name}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad"
-            )
+        self._options, self.mesh, self.seed = options, mesh, o.seed
+        self.log, self.synthetic = o.parametrization != "raw", o.data == "twin"
+        self.measured = o.data is not None and not self.synthetic
+        use_numpy = _by_hand(o, law, self.name)
         law.check(law.of_modulus(1.0, o.nu))
-        top, known, gripped = mesh.boundary(o.loaded, surface=True), measured_nodes(mesh, o), o.load == "displacement"
-        self.log = o.parametrization != "raw"
-        springs = Springs.on(mesh, o.clamped, self.log) if o.support == "springs" else None
-        supported = known if springs is None else springs.facets.node_set
-        held = held_components(mesh, "none" if supported.size else o.clamped, o.fixed, supported)
-        clamp = np.flatnonzero(held.all(axis=1))
-        if known.size:
-            clamp = np.union1d(clamp, np.setdiff1d(known, top.node_set) if gripped else known)
-        moved = np.setdiff1d(top.node_set, clamp)
-        if not moved.size:
-            raise InputError(f"{self.name}: loaded={o.loaded}: all its nodes are clamped - choose another face")
-        area = float(top.areas(mesh.geometry.X, np).sum())
-        if not gripped and not area > 0.0:
-            raise InputError(f"{self.name}: loaded={o.loaded} lies on the axis and has no area - choose another face")
-        E, measured = o.modulus or 1.0, o.data not in (None, "twin")
-        noise = standard_deviation(o.noise, measured, self.name)
-        self.measured = measured
-        uniform = o.data is not None or o.modulus is not None
-        if o.direction is not None:
-            directions = load_direction(o.direction, top, self.name)[None]
-        strain_noise = standard_deviation(o.strain_noise, True, self.name, "ratio", "strain_noise")
-        reading = (o.columns, o.units, o.outside, noise, known, strain_noise)
-        found = probes.read_probes(mesh, o.data, *reading) if measured else None
-        traction = o.traction if o.force is None else o.force / area
-        amplitude, unit = (o.displacement, "m") if gripped else (traction, "Pa")
-        loads = None if found is None else found.loads
-        F = forces(o, loads, self.name) if gripped and measured else None
-        if gripped and known.size:
-            amplitude, directions = 0.0, np.repeat(directions[:1], 1 if loads is None else len(loads.values), axis=0)
-        elif loads is not None:
-            amplitude, directions = self._by_file(loads, amplitude, directions[0], area)
+
+        supports = Supports.of(mesh, o, self.log)
+        loading = Loading.of(mesh, o, supports, directions)
+        self.noise = standard_deviation(o.noise, self.measured, self.name)
+        found = read_file(mesh, o, self.noise, supports.known) if self.measured else None
+        if found is not None:
+            loading = loading.of_file(o, supports, found.loads, self.name)
         self.constants = None if o.constants is None else Constants.parse(o.constants, law, self.name)
-        field = design_variables.default_modulus(mesh.normalized(mesh.geometry.centres))
-        q = law.of_modulus(np.full_like(field, E) if measured or o.modulus else field, o.nu)
-        choices: dict[AnyDesign, Callable[[], DesignVariables]] = {
-            "modulus": lambda: design_variables.moduli(mesh, law, o.nu, self.log, uniform, E),
-            "layers": lambda: design_variables.layers(mesh, law, o.nu, self.log, uniform, E, o.layers),
-            "regions": lambda: design_variables.regions(mesh, law, o.nu, self.log, uniform, E),
-            "thickness": lambda: design_variables.thicknesses(mesh, q, self.log, uniform),
-            "constants": lambda: (
-                self.constants.design(mesh, law, o.nu, E)
-                if self.constants
-                else design_variables.constants(mesh, law, o.nu, E)
-            ),
-            "traction": lambda: design_variables.tractions(mesh, top, amplitude * directions[0]),
-            "shape": lambda: design_variables.shape(mesh, o.surface, np.union1d([*clamp, *supported], top.node_set)),
-            "load": lambda: design_variables.amplitude(o.load, amplitude, unit),
-        }
-        base = Setup(q, mesh.geometry.X, np.float64(amplitude))
-        values = np.zeros((len(directions), 0, directions.shape[1]))
-        if found is not None and known.size:
-            values = np.stack([of.values for of in found.boundary])
-        gripped_nodes = moved if gripped and not known.size else np.zeros(0, dtype=int)
-        bc = BoundaryConditions.of(mesh, held, gripped_nodes, directions, known, values)
-        design = choices[o.unknown]()
-        design = design if springs is None else springs.beside(design, E / mesh.diameter)
-        self.solid = LoadedSolid(mesh, law, bc, top, o.load, directions, design, base, springs, use_numpy)
-        self.parameters = self.solid.design.parameters
-        self.regularization = self._prior(o.alpha, o.phi, o.phi_width, o.unknown)
-        self.n_state = bc.n_u
+
+        base = base_of(o, mesh, law, loading, self.measured)
+        bc = supports.boundary_conditions(mesh, loading.directions, () if found is None else found.boundary)
+        design = design_of(o, self.log, mesh, law, base, supports, loading, self.constants)
+        on, along, springs = supports.loaded, loading.directions, supports.springs
+        self.solid = LoadedSolid(mesh, law, bc, on, o.load, along, design, base, springs, use_numpy)
+        self.n_state, self.parameters = bc.n_u, design.parameters
+        self.regularization = self._prior(o.alpha)
+        self._classify(o)
+
+        self.data, said = data_of(o, self.solid, supports, found, loading.forces, self.noise)
+        self.start_from_data = self.measured and self._is_told_by_data(o, loading)
+        if o.mesh or self.measured:
+            self.read_as = (*said, *setting(o, self.solid, supports))
+        self.notes = (*doubts(o, self.solid, self.locks, found), *self.read_as)
+        self.drive = "displacement" if supports.gripped else "load and displacement" if supports.known.size else "load"
+
+    def _classify(self, o: SimpleNamespace) -> None:
+        """What routes and solvers may rely on of R."""
         self.linear = o.law == "linear" and o.load != "follower"
         self.affine = self.linear and o.unknown in ("traction", "load")
         self.affine_at_rest = o.load == "traction" and o.unknown in ("traction", "load")
         self.structure = "spd" if self.solid.symmetric else "general"
-        self.matrix_free = self.solid.symmetric or not use_numpy
-        self.noise, self.seed = noise, o.seed
-        self.synthetic = o.data == "twin"
-        if self.locks and o.nu > NEARLY_INCOMPRESSIBLE:
-            self.notes += (f"nu={o.nu:.6g} is nearly incompressible: these elements lock, and digits are lost",)
-        if amplitude == 0.0 and o.unknown in MATERIAL and not known.size:
-            self.notes += ("zero load: u = 0, and no gradient tells anything about the material",)
-        if found is not None:
-            apart = np.union1d(clamp, nodes_of_faces(mesh, o.clamped))
-            self.data, said = self._from_file(found, F, apart)
-            self.read_as = (*found.notes, *said)
-            told = o.modulus is not None or (self.constants is not None and bool({*self.constants.start} - {"nu"}))
-            self.start_from_data = not told and o.unknown in FITTED and (not gripped or F is not None)
-        elif o.markers:
-            in_plane = o.components == "in-plane"
-            self.data = self._without_file(probes.markers(mesh, o.face, o.markers, in_plane, o.seed))
-        else:
-            where = o.sensors or ("right" if gripped else o.loaded)
-            nodes = np.unique(mesh.geometry.nodes) if where == "everywhere" else mesh.boundary(where).node_set
-            self.data = self._without_file(probes.at_nodes(mesh, nodes))
-        if o.mesh or measured:
-            how = "on springs" if springs else "at measured displacements" if known.size else "held"
-            words = support_in_words(mesh, o.clamped, o.fixed, how)
-            applied = () if gripped and known.size else (load_in_words(self.solid, o.loaded),)
-            self.read_as = (*self.read_as, words, *applied)
-            self.notes += self.read_as
-        self.data = self.data.with_motion(o.motion)
-        if gripped:
-            self.drive = "displacement"
-        elif known.size:
-            self.drive = "load and displacement"
-        if self.data.reads_nothing():
-            raise InputError(
-                f"{self.name}: all that is measured is held at zero and tells nothing - choose other points"
-            )
+        self.matrix_free = self.solid.symmetric or not self.solid.use_numpy
 
-    def _by_file(self, loads: LoadCases, amplitude: float, direction: Array, area: float) -> tuple[float, Array]:
-        """The amplitude and the directions (cases, d) of a file's load cases."""
-        o = self._options
-        if o["unknown"] == "traction" and len(loads.values) > 1:
-            raise InputError(f"{self.name}: unknown=traction takes one load case, {o['data']} has {len(loads.values)}")
-        if o["force"] is not None and loads.kind != "ratio":
-            raise InputError(f"{self.name}: force= and column load of {o['data']} both state the load - keep one")
-        a = loads.amplitudes(o["load"], amplitude, area, self.name)
-        largest = amplitude if loads.kind == "ratio" else float(a[np.abs(a).argmax()])
-        return largest, np.outer(a / (largest or 1.0), direction)
+    def _is_told_by_data(self, o: SimpleNamespace, loading: Loading) -> bool:
+        """Whether a file's data tell the size of p, and no option does."""
+        told = o.modulus is not None or (self.constants is not None and bool({*self.constants.start} - {"nu"}))
+        return not told and o.unknown in FITTED and (o.load != "displacement" or loading.forces is not None)
 
-    def _from_file(
-        self, measured: probes.Measured, F: Array | None, apart: Array
-    ) -> tuple[DisplacementData, tuple[str, ...]]:
-        """The data, forces F (cases,) [N] among them, and notes; `apart` are nodes that a measured force is not of."""
-        o, said = self._options, [in_words(measured.boundary)] if measured.boundary else []
-        greatest, size = max(float(np.abs(d).max()) for d in measured.d), self.mesh.diameter
-        if greatest > size:
-            self.notes += (f"data up to {greatest:.3g} m for a body of {size:.3g} m: are the units right?",)
-        if measured.strains is not None and self.solid.design.moved_nodes is not None:
-            raise InputError(f"{self.name}: strains are read in a mesh that stands still, not with unknown=shape")
-        data = DisplacementData(self.solid, measured.probes, measured.d, measured.sigma, strains=measured.strains)
-        if F is not None:
-            d = np.concatenate([d[at.measured] for at, d in zip(measured.probes, measured.d, strict=True)])
-            if not d.size:
-                raise InputError(f"{self.name}: force= of a grip is weighed beside displacements - measure some, too")
-            rms = float(np.sqrt(np.mean(d**2)))
-            direction = self.solid.directions[0]
-            force, note = force_data(self.solid, F, direction, apart, o["force_noise"], measured.sigma, rms)
-            return replace(data, force=force), (*said, note)
-        if o["force_noise"] is not None:
-            raise InputError(f"{self.name}: force_noise= is that of force=, which is not given - give both or none")
-        if self.solid.load == "displacement" and o["unknown"] in MATERIAL:
-            said.append("displacements alone tell ratios of moduli; their size stays that of the start: give force=")
-        return data, tuple(said)
-
-    def _without_file(self, points: probes.Probes) -> DisplacementData:
-        """The target displacements; none yet for synthetic data."""
-        height = TARGET * (points.x[:, -1] - self.mesh.bounding_box[0, -1])
-        target = tuple(height[:, None] * direction for direction in self.solid.directions)
-        cases = (points,) * len(self.solid.directions)
-        return DisplacementData(self.solid, cases, None if self.synthetic else target, self.noise)
-
-    def _prior(self, alpha: float, phi: Phi | None, width: float, unknown: AnyDesign) -> Prior:
-        """Neighbours are cells that share a facet, and adjacent layers."""
-        kind = phi or ("tikhonov" if unknown in FIELDS else "amplitude")
-        f2t = self.mesh.skfem_mesh.f2t
-        pairs = np.asarray(f2t.T[f2t[1] != -1]) if unknown in CELLWISE else None
-        n, scale = len(self.parameters), self.parameters.scale.copy()
-        if self.solid.springs is not None:  # k has no neighbours, and no prior
-            pairs = np.stack([np.arange(1, n - 1), np.arange(n - 2)], axis=1) if unknown == "layers" else pairs
-            scale[-1] = np.inf
-        prior = Prior(alpha, kind, width, pairs, self.parameters.start, scale)
-        if kind == "amplitude" and unknown in MODULI:
-            prior = replace(
-                prior, origin=self._theta(self.parameters.start), scale=np.where(np.isinf(scale), scale, 1.0)
-            )
-        prior.check(self.name)
-        return prior
+    def _prior(self, alpha: float) -> Prior:
+        theta = self._theta(self.parameters.start)
+        return prior_of(alpha, SimpleNamespace(**self._options), self.solid, self.parameters, theta)
 
     # --- the problem contract
 
@@ -323,7 +190,7 @@ class Solid(Problem):
         if self.solid.springs is not None and self.log:
             scale[-1] = 1.0
         other.parameters = replace(self.parameters, start=start, scale=scale)
-        other.regularization = other._prior(self.alpha, o["phi"], o["phi_width"], o["unknown"])
+        other.regularization = other._prior(self.alpha)
         return other
 
     def completed(self, given: Mapping[str, float]) -> Array | None:
@@ -387,27 +254,7 @@ class Solid(Problem):
     # --- output
 
     def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:
-        """u, lam (n_nodes, 3) per load case; E, dJ/dE per cell if p are moduli, t and dJ/dt if it is the thickness;
-        dJ/dX per node if p is a shape.
-        """
-        solid, design, geometry = self.solid, self.solid.design, self.mesh.geometry
-        s, every, cases = solid.setup(p), np.arange(len(geometry.X)), len(solid.directions)
-        point_data, cell_data = {}, {}
-        for case in range(cases):
-            number = f"_{case + 1}" if cases > 1 else ""
-            point_data[f"u{number}"] = solid.displacements(u, s, case, every)
-            if lam is not None:
-                point_data[f"lambda{number}"] = solid.bc.variations(lam, case, every)
-        if design.field is not None:
-            name, cells = design.field, design.parameter_of_cell
-            value = np.exp(p) if self.log else p
-            by_value = gradient / value if self.log else gradient
-            cell_data = {name: value[cells], f"dJ_d{name}": by_value[cells]}
-        if design.moved_nodes is not None:
-            point_data["dJ_dX"] = np.zeros_like(s.X)
-            moved = design.moved_nodes
-            point_data["dJ_dX"][moved] = gradient[: moved.size * geometry.dim].reshape(-1, geometry.dim)
-        return Fields(in_space(s.X), *geometry.for_meshio(), {k: in_space(v) for k, v in point_data.items()}, cell_data)
+        return fields_of(self.solid, self.log, p, u, lam, gradient)
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         x, moved = self.parameters.position, self.data.moved(u, p)
@@ -416,6 +263,10 @@ class Solid(Problem):
         return ParameterView(columns, remarks=(f"eliminated from J: {motion}",) if motion else ())
 
 
-def in_space(x: Array) -> Array:
-    """Points or vectors (n, d) as (n, 3)."""
-    return np.pad(x, ((0, 0), (0, 3 - x.shape[1])))
+def _by_hand(o: SimpleNamespace, law: MaterialLaw, who: str) -> bool:
+    """Whether to take hand-derived NumPy code. Raises InputError where there is none."""
+    exist = law.numpy is not None and o.unknown in MATERIAL and o.load != "follower"
+    use_numpy = exist if o.derivatives is None else o.derivatives == "hand"
+    if use_numpy and law.numpy is None:
+        raise InputError(f"{who}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad")
+    return use_numpy

@@ -204,6 +204,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         "force_noise needs load=displacement and data=FILE",
     ),
     "a face that touches": ({"force": 1.0, "clamped": "bottom"}, "one that does not touch"),
+    "a face of no area": (
+        {"boundary": "zero", "kind": "axisymmetric", "loaded": "left", "load": "displacement", "force": 1.0},
+        "one that does not touch",
+    ),
 }
 
 
