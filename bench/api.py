@@ -29,8 +29,8 @@ from gradient_routes.routes.route import Route
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from gradient_routes.bench.inversion.invert import Inversion
     from gradient_routes.bench.inversion.optimizers import Name
+    from gradient_routes.bench.inversion.result import Inversion
     from gradient_routes.bench.inversion.variables import Positive
     from gradient_routes.bench.studies.identify.identifiability import Identified
     from gradient_routes.bench.verification.result import Check

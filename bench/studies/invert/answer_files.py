@@ -6,7 +6,7 @@ import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gradient_routes.bench.inversion.invert import Inversion
+from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.store.output_files import Output
 from gradient_routes.bench.studies.bill import vtu
 from gradient_routes.problems.errors import InputError

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from gradient_routes.bench.inversion.invert import Inversion
 from gradient_routes.bench.inversion.lcurve import CLOSE, Point
+from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.inversion.tradeoff import Trade
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.terminal.plot import Series, plot

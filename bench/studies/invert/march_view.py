@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.text import Text
 
-from gradient_routes.bench.inversion.invert import Inversion
+from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.render.terminal.plot import Series, plot
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from gradient_routes.bench.inversion.frames import Estimates
 from gradient_routes.bench.inversion.history import Iterate
-from gradient_routes.bench.inversion.invert import Inversion
 from gradient_routes.bench.inversion.lcurve import Point
 from gradient_routes.bench.inversion.linear_map import LinearMap
+from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.inversion.tradeoff import Trade
 
 

@@ -11,10 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from gradient_routes.bench.inversion.history import Iterate
-from gradient_routes.bench.inversion.invert import Inversion
 from gradient_routes.bench.inversion.linear_map import SUFFICES
 from gradient_routes.bench.inversion.one_shot import OneShot
 from gradient_routes.bench.inversion.optimizers import AT_NOISE
+from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.render.format import number, seconds
 from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
