@@ -56,7 +56,7 @@ SLOW = "torch-fem[solver=direct] warp jax-fem[tolerances=tight] feax[tolerances=
 DIRECT = {4: FAST + SLOW, 16: FAST}
 DEFAULT, TIGHT = 1e-12, 1e-14  # rtol
 POLISHED = Solver(rtol=1e-14, adjoint_rtol=1e-15, polish=2)
-ABSENT = {"Taichi, explicit dynamics in the manner of DiffTaichi": "there is no transient problem yet"}
+ABSENT = {"Taichi, explicit dynamics in the manner of DiffTaichi": "its adapter for vibrating-bar is not written yet"}
 COLUMNS = (
     "problem n route status reason name versions J error off_adjoint first_s compile_s forward_s backward_s peak_bytes"
     " tape_bytes memory_by rtol started"
