@@ -62,7 +62,7 @@ class VibratingBar(Transient):
         c_m: Annotated[float, "c_M of rayleigh [1/s]"] = 0.1,
         c_k: Annotated[float, "c_K of rayleigh [s]"] = 0.01,
         c_g: Annotated[float, "strength of skew damping, times M/s"] = 0.1,
-        sensors: Annotated[Nodes, "5: nodes 1 to 5; 1,3,5 or 2..6: these [every second]"] = "",
+        sensors: Annotated[Nodes | None, "5: nodes 1 to 5; 1,3,5 or 2..6: these [every second]"] = None,
         parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
         modulus: Annotated[float, "E of the start [Pa]"] = 1.0,
         density: Annotated[float, "rho [kg/m3]"] = 1.0,
@@ -112,7 +112,14 @@ class VibratingBar(Transient):
         self.skew = np.full(n - 1, c_g * self.mass[0] if damping == "skew" else 0.0)  # above the diagonal [kg/s]
         t = np.arange(steps + 1) * dt
         self.F = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)  # (T + 1,) [N]
-        self.nodes = parse_nodes(sensors or list(range(n, 0, -2))[::-1], n, self.name)
+        if not self.F.any():
+            raise InputError(
+                f"vibrating-bar: force={force:g},pulse={pulse:g} acts at none of {steps} steps of dt={dt:g} and moves"
+                " nothing - choose force != 0 and dt < pulse"
+            )
+        self.nodes = parse_nodes([*range(2 - n % 2, n + 1, 2)] if sensors is None else sensors, n, self.name)
+        if not len(self.nodes):
+            raise InputError("vibrating-bar: sensors=0 measure nothing - choose at least one node")
         self.d: Array | None = None  # (T, m) [m]
         self._kept: tuple[Array, tuple[StepMatrix, StepMatrix]] | None = None
         self.x = (np.arange(n) + 0.5) * self.L_e

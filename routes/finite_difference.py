@@ -31,6 +31,8 @@ def check(*, step: float | None, start: str) -> None:
 def missing(problem: Problem, *, start: str, **options: Any) -> str | None:
     if start != "cold" and Offers.SOLVE not in problem.offers:
         return f"start={start} needs R(u, p) and R_u as numbers, which {problem.name} does not offer"
+    if start != "cold" and problem.steps and not problem.linear:
+        return f"start={start} needs one solve for the whole state, {problem.name} is solved step by step from rest"
     return None
 
 

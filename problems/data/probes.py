@@ -166,7 +166,8 @@ def read_probes(
     strains = StrainGauges.of(mesh.geometry, placed, e, axes, weight)
     everything = Probes(placed.nodes, placed.N, placed.x, measured, weights)
     cases = "" if loads is None else loads.said(rows)
-    notes = tuple(filter(None, (table.said, cases, *sorted(repeated), *placed.said, doubtful)))
+    shear = "" if strains is None else strains.said
+    notes = tuple(filter(None, (table.said, shear, cases, *sorted(repeated), *placed.said, doubtful)))
     d = np.where(measured, d, 0.0)
     of_case = [slice(None)] if loads is None else [np.flatnonzero(case == k) for k in range(case.max() + 1)]
     each = tuple(everything.at(of) for of in of_case), tuple(d[of] for of in of_case)

@@ -107,6 +107,12 @@ class StrainGauges:
         return sparse.csr_array((B.ravel(), (row.ravel(), at.ravel())), shape=(len(point), columns))
 
     @property
+    def said(self) -> str:
+        """What shear strains are, where some are measured, else empty."""
+        shear = [name for name, of in zip(self.names, self.measured.T, strict=True) if of.any() and name[1] != name[2]]
+        return f"{', '.join(shear)}: half the change of the right angle, gamma/2" if shear else ""
+
+    @property
     def quantities(self) -> Array:
         return np.array(self.names)[np.nonzero(self.measured)[1]]
 

@@ -67,6 +67,7 @@ def test_J_is_weighed_by_both_noises_and_its_gradient_exact(motion: str, file) -
     np.testing.assert_allclose(seen.S_u.T @ (seen.predicted - seen.data), lin.J_u, rtol=1e-11, atol=1e-20)
     assert seen.quantity.tolist()[-3:] == ["exx", "exy", "exx"]
     assert seen.label(len(r) - 3) == "exx at (0.6, 0.7)"
+    assert "exy: half the change of the right angle, gamma/2" in plate.read_as
     measured = (seen.whole or seen).data / seen.relative
     np.testing.assert_allclose(measured[-3:], [2e-4, 1e-4, 1e-4], rtol=1e-12)
     np.testing.assert_allclose(seen.relative[-3:], 1e-6 / 20e-6, rtol=1e-12)

@@ -13,6 +13,7 @@ from gradient_routes.problems.errors import DomainError, InputError
 from gradient_routes.problems.vibrating_bar import VibratingBar
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
+from gradient_routes.routes.finite_difference import fd_central
 from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
@@ -108,6 +109,14 @@ def test_gradients_hold_where_the_tip_meets_a_stop(scheme: str, stop: str) -> No
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
 
 
+def test_differences_near_a_march_with_a_stop_start_from_rest() -> None:
+    bar = made(stop="softplus")
+    for start in ("warm", "chord"):
+        assert "is solved step by step from rest" in str(fd_central.objection(bar, start=start))
+        assert fd_central.objection(made(), start=start) is None
+    assert fd_central.objection(bar, start="cold") is None
+
+
 def test_a_stop_throws_the_bar_back_as_a_fine_integrator_says() -> None:
     """SciPy's DOP853 with the force of the stop written out; errors fall by 4 for half the step."""
     n, end, off = 2, 1.2, []
@@ -194,6 +203,9 @@ def test_an_explicit_step_beyond_its_limit_is_refused() -> None:
         ({"c_m": 0.2}, "c_m"),
         ({"sensors": "9"}, "there are 4"),
         ({"noise": -1.0}, "noise=-1"),
+        ({"sensors": 0}, "sensors=0 measure nothing"),
+        ({"dt": 0.5}, "pulse=0.5 acts at none of 12 steps of dt=0.5 and moves nothing"),
+        ({"force": 0.0}, "force=0,pulse=0.5 acts at none"),
     ],
 )
 def test_bad_options_are_told(options: dict[str, Any], says: str) -> None:
