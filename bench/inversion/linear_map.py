@@ -30,7 +30,7 @@ from gradient_routes.problems.problem import Array
 
 MOST = 5e7  # entries of a map
 LINEAR = "the linear answer"
-SUFFICES = f"{LINEAR} suffices"
+SUFFICES, INSUFFICIENT = f"{LINEAR} suffices", f"{LINEAR} does not suffice"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from gradient_routes.bench.cases.study import Found, Kept, Note, Say
 from gradient_routes.bench.inversion.frames import estimated, read_frames
 from gradient_routes.bench.inversion.history import Iterate
 from gradient_routes.bench.inversion.invert import Engine, invert
-from gradient_routes.bench.inversion.linear_map import LinearMap, linear_map, whole_step
+from gradient_routes.bench.inversion.linear_map import INSUFFICIENT, LinearMap, linear_map, whole_step
 from gradient_routes.bench.inversion.objective import noise_level
 from gradient_routes.bench.inversion.optimizers import Limits
 from gradient_routes.bench.store.output_files import Output, read_by
@@ -61,7 +61,7 @@ def by_map(
         say(Found(Framed(estimates)))
         code = max(code, int(estimates.unexplained))
         say(Note(f"p of every frame in {outputs['.csv'].path}", result=True))
-    return code  # 1: a wrong gradient, or data or frames that the model does not explain
+    return code  # 1: a wrong gradient or answer, or data or frames that the model does not explain
 
 
 def _only(routes: Sequence[str]) -> Sequence[str]:
@@ -93,7 +93,7 @@ def _built(say: Say, spec: ProblemSpec, route: RouteSpec, engine: Engine, at: st
         for row in rows:
             say(Kept(table, row))
     say(Found(Mapped(found, by)))
-    return by, 1 if found.misled or found.unexplained else 0
+    return by, 1 if found.misled or found.unexplained or found.end.startswith(INSUFFICIENT) else 0
 
 
 def _show(say: Say, noise: bool, step: Iterate) -> None:

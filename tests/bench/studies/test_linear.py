@@ -126,7 +126,7 @@ def frames_csv(columns: str, rows: Array, path: str = "frames.csv") -> None:
 def test_a_map_is_made_once_and_applied_to_files(cli) -> None:
     """The bar's own data as the first frame give what --linear prints; columns are found by their names."""
     first = cli("invert", "--problem", "bar[noise=0.01,alpha=0.01]", "--linear", "-o", "map.npz", "--json")
-    assert first.code == 0, first.err
+    assert first.code == 1, "its answer does not suffice for noise of 0.01"
     p = [row["estimate"] for row in first.rows if row["table"] == "estimates"]
     d = np.array([Bar(noise=0.01).sensors.d, np.full(5, 0.5), np.full(5, 3.0)])
     frames_csv("u_5,u_1,u_4,u_2,u_3", d[:, [4, 0, 3, 1, 2]])
@@ -209,6 +209,11 @@ def test_a_linear_answer_is_called_enough_by_its_readings() -> None:
     assert inverted("bar", "linear").end.startswith("the linear answer: its readings differ")
     assert far.regime is None, "R is linear in u"
     assert LinearRegime.of(np.array([3.0, -4.0]), 10.0).described("it").endswith("0.35 sigma, 0.4 at most")
+
+
+@pytest.mark.parametrize(("noise", "code"), [(1e-3, 1), (0.02, 0)])
+def test_a_linear_answer_that_does_not_suffice_is_no_success(cli, noise: float, code: int) -> None:
+    assert cli("invert", "--problem", f"bar[noise={noise},alpha=10]", "--linear", "--no-store").code == code
 
 
 @pytest.mark.parametrize(
