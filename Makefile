@@ -117,7 +117,7 @@ mutants: $(READY) ## 60 small faults in problems, routes and the judge: do the t
 reports: $(READY) ## everything in results/ as one page, results/report.html; of the reference run where there is no other
 	$(BIN)/routes report --store $(REPORTED) -o results/report.html
 
-reference: $(READY) ## the small reference run that is committed, and its report, anew
+reference: $(READY) ## the small reference run that is committed, anew
 	$(BIN)/python -m benchmarks.reference_run
 
 docs: $(READY) ## the documentation as a site, docs/_build/index.html

@@ -13,7 +13,6 @@ from contextlib import closing
 from pathlib import Path
 
 STORE = Path("results/reference.sqlite")
-REPORT = Path("results/reference.html")
 COMMANDS = """
 run --problem bar --problem 'advection[n=4|8]' --route all
 run --problem 'block[n=3]' --route tangent --route adjoint --route implicit-ad --route fd-central
@@ -47,7 +46,6 @@ def main() -> None:
         db.execute(SCRUB)
         db.commit()
         db.execute("VACUUM")
-    subprocess.run([routes, "report", "--store", str(STORE), "-o", str(REPORT)], check=True)
 
 
 if __name__ == "__main__":
