@@ -21,7 +21,6 @@ from gradient_routes.problems.contact import K_C, STOP_WIDTH, CompliantStop, Rig
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
-from gradient_routes.problems.dynamics.bar_step import BarStep
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.recurrence import Recurrence
@@ -212,8 +211,34 @@ class VibratingBar(Transient):
         )
         return StepMatrix(sign * self.row, -self.row * h * of_velocity, K, D)
 
-    def at(self, t: int) -> BarStep:
-        return BarStep(self, t)
+    # --- one step
+
+    def step_residual(self, t: Any, u: Any, v: Any, p: Any, xp: Any = np) -> Any:
+        both = xp.stack([v, u]).reshape(2, 2, self.n)
+        F = xp.stack([xp.asarray(self.F)[t - 1], xp.asarray(self.F)[t]])
+        return self.rows(both[:, 0], both[:, 1], p, F, xp).ravel()
+
+    def step_objective(self, t: Any, u: Any, p: Any, xp: Any = np) -> Any:
+        return 0.5 * xp.sum((u[self.nodes - 1] - xp.asarray(self.data())[t - 1]) ** 2)
+
+    def step_tangent(self, t: int, u: Array, v: Array, p: Array) -> StepMatrix:
+        return self.pressed_matrix(self.step_matrices(p)[0], u[self.n - 1])
+
+    def step_coupling(self, t: int, u: Array, v: Array, p: Array) -> StepMatrix:
+        return self.pressed_matrix(self.step_matrices(p)[1], v[self.n - 1])
+
+    def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
+        both, J_u = np.stack([v, u]).reshape(2, 2, self.n), np.zeros_like(u)
+        J_u[self.nodes - 1] = u[self.nodes - 1] - self.data()[t - 1]
+        return Linearization(self.by_modulus(both[:, 0], both[:, 1], p), J_u, np.zeros_like(p))
+
+    def step_initial(self, t: int, v: Array, p: Array) -> Array:
+        """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
+        x, velocity = v.reshape(2, -1)
+        return np.concatenate([x + self.h * velocity, velocity])
+
+    def step_active_set(self, t: int, u: Array, p: Array) -> str | None:
+        return None if self.stop is None else self.stop.law.active_set(u[self.n - 1] - self.stop.gap)
 
     def with_stop(self, stop: Stop) -> VibratingBar:
         """This bar with another stop but unchanged data."""
@@ -244,13 +269,12 @@ class VibratingBar(Transient):
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 sum_t |S u_t - d_t|^2 + alpha Phi [m2]."""
-        J = 0.5 * xp.sum((self._read(u, xp) - self.data()) ** 2)
-        return J + self.regularization.value(xp, self.log_modulus(p, xp)) if self.alpha else J
+        return 0.5 * xp.sum((self._read(u, xp) - self.data()) ** 2) + self.phi(p, xp)
 
     def linearize(self, u: Array, p: Array) -> Linearization:
         J_u = np.zeros((self.steps, 2, self.n), dtype=u.dtype)
         J_u[:, 0, self.nodes - 1] = self._read(u) - self.data()
-        return Linearization(self.by_modulus(*self.history(u), p), J_u.ravel(), self.by_prior(p))
+        return Linearization(self.by_modulus(*self.history(u), p), J_u.ravel(), self.phi_by(p))
 
     def by_modulus(self, x: Array, v: Array, p: Array) -> ImpulsesByStiffness:
         """R_p of m steps, from displacements and velocities (m + 1, N) before and after them."""
@@ -259,8 +283,10 @@ class VibratingBar(Transient):
             w += self.h * self.c_K * self.scheme.damping(_elongation(v, np))
         return ImpulsesByStiffness(w * (self.stiffness(p) if self.log else self.A / self.L_e))
 
-    def by_prior(self, p: Array) -> Array:
-        """J_p, (N,)."""
+    def phi(self, p: Any, xp: Any = np) -> Any:
+        return self.regularization.value(xp, self.log_modulus(p, xp)) if self.alpha else 0.0
+
+    def phi_by(self, p: Array) -> Array:
         if not self.alpha:
             return np.zeros_like(p)
         by_theta = self.regularization.gradient(self.log_modulus(p))

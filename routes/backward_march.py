@@ -2,7 +2,7 @@
 
     R_u^T lam_t = -(J_u + mu_t),    (mu_{t-1}, g_t) = J_q + R_q^T lam_t,    q = (u_{t-1}, p),  mu_T = 0
 
-and dJ/dp is the sum of all g_t: the transposed solve of the system of all steps, without that system.
+and dJ/dp is the sum of all g_t and of mu_0^T du_0/dp: the transposed solve of the system of all steps, without it.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ def march_back(model: Model, p: Array, schedule: Schedule) -> Result:
         mu, gradient = by_q[:n], gradient + by_q[n:]
         missed = max(missed, norm(step.residual(u, q)))
         scale = max(scale, norm(step.residual(np.zeros_like(u), q)))
+    by = problem.initial_by(p)
+    gradient = gradient if by is None else gradient + by.T @ mu
     for kind in ("forward_solves", "newton_iterations", "assemblies", "solves", "transposed_solves"):
         tally.count(kind)
     tally.count("residuals", 3)

@@ -15,7 +15,7 @@ from gradient_routes.problems.problem import Array
 class Recurrence:
     """A_t z_t + B_t z_{t-1}, t = 1..T, of z = (z_1, .., z_T), (T n,); z_0 = 0.
 
-    A, B        T matrices (n, n) each with `@`, `.T` and `norm`, or one for all steps: then factorized once
+    A, B        T matrices (n, n) each, or one for all steps: then factorized once
     transposed  A_t^T z_t + B_{t+1}^T z_{t+1} instead, z_{T+1} = 0
     """
 
@@ -56,4 +56,9 @@ class Recurrence:
     @property
     def norm(self) -> float:
         """An upper bound of its largest row sum."""
-        return float(max(A.norm for A in self.A) + max(B.norm for B in self.B))
+        return max(map(row_sum, self.A)) + max(map(row_sum, self.B))
+
+
+def row_sum(A: Any) -> float:
+    """|A|_inf of a matrix that knows it, an array or a SciPy sparse matrix."""
+    return float(A.norm if hasattr(A, "norm") else abs(A).sum(axis=1).max())
