@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator
 from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.errors import NotOffered
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.problem import Array, Linearization, Operator, Problem, Traced
+from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
+
+CACHED = 4096  # numbers of an array of states that stay in a cache with a dozen others like it
 
 
 class Transient(Problem):
@@ -18,8 +22,7 @@ class Transient(Problem):
 
     Its state is (u_1, .., u_T), (T n,), R the residuals of all steps and R_u block lower bidiagonal (`Recurrence`): a
     solve is a march, a transposed one a march back, so that every law of a steady problem holds as it stands. A step is
-    written once, by the methods named step_.. below, v being u_{t-1}; the march follows from these. One whose rows of
-    all steps are cheaper together than one by one overrides `residual`, `objective`, `tangent` and `linearize`.
+    written once, by the methods named step_.. below, v being u_{t-1}; the march follows from these.
 
     steps     T
     constant  R_t is affine in u_t and u_{t-1}, with the same R_u and R_v for all t
@@ -73,12 +76,30 @@ class Transient(Problem):
         """alpha dPhi/dp (n_p,)."""
         return np.zeros_like(p)
 
+    # --- some steps: what one overrides whose rows are cheaper together, as arrays, than one by one
+
+    def rows(self, t_0: int, states: Array, p: Array) -> Array:
+        """R (k, n) of steps t_0 + 1..t_0 + k, from states (k + 1, n): u_{t_0}, .., u_{t_0 + k}."""
+        return np.stack([self.step_residual(t, u, v, p) for t, u, v in stepwise(t_0, states)])
+
+    def rates(self, t_0: int, states: Array, p: Array) -> Rates:
+        """J and the partial derivatives of these steps, without alpha Phi."""
+        each = [self.step_linearize(t, u, v, p) for t, u, v in stepwise(t_0, states)]
+        J = np.array([self.step_objective(t, u, p) for t, u, _ in stepwise(t_0, states)])
+        R_p, J_u, J_p = zip(*((lin.R_p, lin.J_u, lin.J_p) for lin in each), strict=True)
+        return Rates(J, Stacked(R_p, states.shape[1]), np.stack(J_u), np.stack(J_p))
+
     # --- the march: what follows
 
     @property
     def n_step(self) -> int:
         """n, the unknowns of a step."""
         return self.n_state // self.steps
+
+    @property
+    def together(self) -> int:
+        """Steps that are evaluated together, so that their arrays stay in a cache."""
+        return max(1, CACHED // self.n_step)
 
     def at(self, t: int) -> Step:
         """Step t = 1..T as a problem: state u_t (n,), parameters q = (u_{t-1}, p), objective J_t, the last with alpha
@@ -90,31 +111,49 @@ class Transient(Problem):
         """u_0 in every step."""
         return np.tile(self.initial_state(p), self.steps)
 
-    def _pairs(self, U: Array, p: Array) -> list[tuple[int, Array, Array]]:
-        """t, u_t, u_{t-1} for t = 1..T."""
-        u, v = U.reshape(self.steps, -1), self.initial_state(p)
-        return [(t + 1, u[t], u[t - 1] if t else v) for t in range(self.steps)]
+    def stretches(self, U: Array, p: Array) -> Iterator[tuple[int, Array]]:
+        """t_0 and states (k + 1, n) of a few steps each."""
+        u, k = U.reshape(self.steps, -1), self.together
+        yield 0, np.concatenate([self.initial_state(p)[None], u[:k]])
+        for t_0 in range(k, self.steps, k):
+            yield t_0, u[t_0 - 1 : t_0 + k]
 
     def residual(self, u: Array, p: Array) -> Array:
-        return np.concatenate([self.step_residual(t, u_t, v, p) for t, u_t, v in self._pairs(u, p)])
+        return np.concatenate([self.rows(t_0, states, p).ravel() for t_0, states in self.stretches(u, p)])
 
     def objective(self, u: Array, p: Array) -> Any:
-        return sum(self.step_objective(t, u_t, p) for t, u_t, _ in self._pairs(u, p)) + self.phi(p)
+        J = self.phi(p)
+        for t_0, states in self.stretches(u, p):
+            for t, u_t, _ in stepwise(t_0, states):
+                J = J + self.step_objective(t, u_t, p)
+        return J
 
     def tangent(self, u: Array, p: Array) -> Recurrence:
-        pairs = self._pairs(u, p)[: 1 if self.constant else None]
-        A = [self.step_tangent(t, u_t, v, p) for t, u_t, v in pairs]
-        return Recurrence(A, [self.step_coupling(t, u_t, v, p) for t, u_t, v in pairs], self.steps)
+        steps = [step for t_0, states in self.stretches(u, p) for step in stepwise(t_0, states)]
+        steps = steps[: 1 if self.constant else None]
+        A = [self.step_tangent(*step, p) for step in steps]
+        return Recurrence(A, [self.step_coupling(*step, p) for step in steps], self.steps)
 
     def linearize(self, u: Array, p: Array) -> Linearization:
-        pairs = self._pairs(u, p)
-        each = [self.step_linearize(t, u_t, v, p) for t, u_t, v in pairs]
-        R_p: list[Operator] = [lin.R_p for lin in each]
-        by = self.initial_by(p)
-        if by is not None:
-            R_p[0] = Sum(R_p[0], Product(self.step_coupling(*pairs[0], p), by))
-        J_p = sum((lin.J_p for lin in each), self.phi_by(p))
-        return Linearization(Stacked(R_p, self.n_step), np.concatenate([lin.J_u for lin in each]), J_p)
+        each = [self.rates(t_0, states, p) for t_0, states in self.stretches(u, p)]
+        R_p = Stacked([one.R_p for one in each], self.n_step * self.together)
+        J_p = sum((one.J_p.sum(axis=0) for one in each), self.phi_by(p))
+        J_u = np.concatenate([one.J_u.ravel() for one in each])
+        return Linearization(self._with_initial(R_p, u, p), J_u, J_p)
+
+    def _with_initial(self, R_p: Operator, u: Array, p: Array) -> Operator:
+        """R_p, to whose first step R_v du_0/dp is added."""
+        by, n = self.initial_by(p), self.n_step
+        if by is None:
+            return R_p
+        R_v = self.step_coupling(1, u[:n], self.initial_state(p), p)
+
+        def forward(dp: Array) -> Array:
+            y = np.asarray(R_p @ dp)
+            y[:n] += R_v @ (by @ dp)
+            return y
+
+        return ByProducts(forward, lambda lam: R_p.T @ lam + by.T @ (R_v.T @ lam[:n]))
 
     def traced(self) -> Traced:
         """R and J of all steps by one trace of a step."""
@@ -134,46 +173,7 @@ class Transient(Problem):
         return Traced(residual, objective)
 
 
-class Stacked:
-    """Operators (n, n_p) of all steps, one below the other."""
-
-    def __init__(self, rows: Sequence[Operator], n: int, transposed: bool = False) -> None:
-        self.rows, self.n, self.transposed = rows, n, transposed
-
-    @property
-    def T(self) -> Stacked:
-        return Stacked(self.rows, self.n, not self.transposed)
-
-    def __matmul__(self, x: Array) -> Array:
-        if self.transposed:
-            y = x.reshape(len(self.rows), self.n)
-            return np.asarray(sum(row.T @ y_t for row, y_t in zip(self.rows, y, strict=True)))
-        return np.concatenate([row @ x for row in self.rows])
-
-
-class Product:
-    """A B, given by its factors."""
-
-    def __init__(self, A: Operator, B: Operator) -> None:
-        self.A, self.B = A, B
-
-    @property
-    def T(self) -> Product:
-        return Product(self.B.T, self.A.T)
-
-    def __matmul__(self, x: Array) -> Any:
-        return self.A @ (self.B @ x)
-
-
-class Sum:
-    """A + B, given by its terms."""
-
-    def __init__(self, A: Operator, B: Operator) -> None:
-        self.A, self.B = A, B
-
-    @property
-    def T(self) -> Sum:
-        return Sum(self.A.T, self.B.T)
-
-    def __matmul__(self, x: Array) -> Any:
-        return self.A @ x + self.B @ x
+def stepwise(t_0: int, states: Array) -> Iterator[tuple[int, Array, Array]]:
+    """t, u_t and u_{t-1} of steps t_0 + 1..t_0 + k, from states (k + 1, n)."""
+    for i in range(1, len(states)):
+        yield t_0 + i, states[i], states[i - 1]

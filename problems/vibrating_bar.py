@@ -23,9 +23,11 @@ from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Traced
+from gradient_routes.problems.rates import Rates
 from gradient_routes.problems.transient import Transient
 
 N_MAX, STEPS_MAX, STATE_MAX = 10**5, 10**6, 10**8
@@ -141,17 +143,15 @@ class VibratingBar(Transient):
         """Spring constants D = E A / L_e, (N,) [N/m]."""
         return (xp.exp(p) if self.log else p) * (self.A / self.L_e)
 
-    def history(self, u: Any, xp: Any = np) -> tuple[Any, Any]:
-        """Displacements and velocities, (T + 1, N) each, those of rest included."""
-        z = xp.reshape(u, (self.steps, 2, self.n))
-        rest = xp.zeros((1, self.n), dtype=z.dtype)
-        return xp.concatenate([rest, z[:, 0]]), xp.concatenate([rest, z[:, 1]])
+    def histories(self, states: Any) -> tuple[Any, Any]:
+        """Displacements and velocities, (k, N) each, of states (k, 2 N)."""
+        return states[:, : self.n], states[:, self.n :]
 
-    def residual(self, u: Any, p: Any, xp: Any = np) -> Any:
-        """R (T 2 N,) [N s]: what is left of the two rows of every step, see `Scheme`."""
-        return xp.reshape(self.rows(*self.history(u, xp), p, self.F, xp), (self.n_state,))
+    def rows(self, t_0: int, states: Array, p: Array) -> Array:
+        F = self.F[t_0 : t_0 + len(states)]
+        return np.asarray(self.impulses(*self.histories(states), p, F).reshape(len(states) - 1, -1))
 
-    def rows(self, x: Any, v: Any, p: Any, F: Array, xp: Any = np) -> Any:
+    def impulses(self, x: Any, v: Any, p: Any, F: Array, xp: Any = np) -> Any:
         """R (m, 2, N) of m steps from displacements, velocities (m + 1, N) and F (m + 1,) before and after them."""
         h, scheme, k = self.h, self.scheme, self.stiffness(p, xp)
         moved = self.row * (x[1:] - x[:-1] - h * scheme.velocity(v))
@@ -177,7 +177,7 @@ class VibratingBar(Transient):
         A, B = self.step_matrices(p)
         if self.stop is None:
             return Recurrence((A,), (B,), self.steps)
-        tips = self.history(u)[0][:, -1]
+        tips = np.append(0.0, u.reshape(self.steps, -1)[:, self.n - 1])
         new, old = ([self.pressed_matrix(M, tip) for tip in at] for M, at in ((A, tips[1:]), (B, tips[:-1])))
         return Recurrence(new, old, self.steps)
 
@@ -214,9 +214,8 @@ class VibratingBar(Transient):
     # --- one step
 
     def step_residual(self, t: Any, u: Any, v: Any, p: Any, xp: Any = np) -> Any:
-        both = xp.stack([v, u]).reshape(2, 2, self.n)
         F = xp.stack([xp.asarray(self.F)[t - 1], xp.asarray(self.F)[t]])
-        return self.rows(both[:, 0], both[:, 1], p, F, xp).ravel()
+        return self.impulses(*self.histories(xp.stack([v, u])), p, F, xp).ravel()
 
     def step_objective(self, t: Any, u: Any, p: Any, xp: Any = np) -> Any:
         return 0.5 * xp.sum((u[self.nodes - 1] - xp.asarray(self.data())[t - 1]) ** 2)
@@ -228,9 +227,8 @@ class VibratingBar(Transient):
         return self.pressed_matrix(self.step_matrices(p)[1], v[self.n - 1])
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
-        both, J_u = np.stack([v, u]).reshape(2, 2, self.n), np.zeros_like(u)
-        J_u[self.nodes - 1] = u[self.nodes - 1] - self.data()[t - 1]
-        return Linearization(self.by_modulus(both[:, 0], both[:, 1], p), J_u, np.zeros_like(p))
+        rates = self.rates(t - 1, np.stack([v, u]), p)
+        return Linearization(rates.R_p, rates.J_u[0], rates.J_p[0])
 
     def step_initial(self, t: int, v: Array, p: Array) -> Array:
         """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
@@ -252,7 +250,7 @@ class VibratingBar(Transient):
         """The steps, counted from 1, after which a stop of the penalty law is closed."""
         if self.stop is None or self.stop.law.active_set(0.0) is None:
             return None
-        closed = np.flatnonzero(self.history(u)[0][1:, -1].real > self.stop.gap) + 1
+        closed = np.flatnonzero(u.reshape(self.steps, -1)[:, self.n - 1].real > self.stop.gap) + 1
         return ",".join(map(str, closed)) or "open"
 
     def _check_stable(self, k: Array) -> None:
@@ -267,14 +265,11 @@ class VibratingBar(Transient):
                 " p - choose a smaller dt or another scheme"
             )
 
-    def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
-        """J = 1/2 sum_t |S u_t - d_t|^2 + alpha Phi [m2]."""
-        return 0.5 * xp.sum((self._read(u, xp) - self.data()) ** 2) + self.phi(p, xp)
-
-    def linearize(self, u: Array, p: Array) -> Linearization:
-        J_u = np.zeros((self.steps, 2, self.n), dtype=u.dtype)
-        J_u[:, 0, self.nodes - 1] = self._read(u) - self.data()
-        return Linearization(self.by_modulus(*self.history(u), p), J_u.ravel(), self.phi_by(p))
+    def rates(self, t_0: int, states: Array, p: Array) -> Rates:
+        J_u, off = np.zeros_like(states[1:]), states[1:, self.nodes - 1] - self.data()[t_0 : t_0 + len(states) - 1]
+        J_u[:, self.nodes - 1] = off
+        J_p = np.broadcast_to(np.zeros_like(p), (len(J_u), len(p)))
+        return Rates(0.5 * (off**2).sum(axis=1), self.by_modulus(*self.histories(states), p), J_u, J_p)
 
     def by_modulus(self, x: Array, v: Array, p: Array) -> ImpulsesByStiffness:
         """R_p of m steps, from displacements and velocities (m + 1, N) before and after them."""
@@ -296,9 +291,17 @@ class VibratingBar(Transient):
         return p if self.log else xp.log(p)
 
     def traced(self) -> Traced:
+        """Of all steps as arrays, which compiles faster than a step that is mapped."""
         from gradient_routes.problems.jax64 import jnp
 
-        return Traced(lambda u, p: self.residual(u, p, jnp), lambda u, p: self.objective(u, p, jnp))
+        def residual(U: Any, p: Any) -> Any:
+            states = jnp.concatenate([jnp.zeros((1, self.n_step)), U.reshape(self.steps, -1)])
+            return self.impulses(*self.histories(states), p, self.F, jnp).ravel()
+
+        def objective(U: Any, p: Any) -> Any:
+            return 0.5 * jnp.sum((self._read(U, jnp) - self.data()) ** 2) + self.phi(p, jnp)
+
+        return Traced(residual, objective)
 
     # --- data
 
@@ -355,33 +358,21 @@ class VibratingBar(Transient):
 
 
 class ImpulsesByStiffness:
-    """R_p of all steps, (T 2 N, N): column e the impulses [N s] of element e, stretched by w (T, N)."""
+    """R_p of k steps, (k 2 N, N): column e the impulses [N s] of element e, stretched by w (k, N)."""
 
     def __init__(self, w: Array) -> None:
         self.w = w
 
     @property
-    def T(self) -> StiffnessByImpulses:
-        return StiffnessByImpulses(self.w)
+    def T(self) -> ByProducts:
+        return ByProducts(lambda lam: self.each_transposed(lam.reshape(len(self.w), -1)).sum(axis=0), self.__matmul__)
 
     def __matmul__(self, dp: Array) -> Array:
         driven = _spread(self.w * dp, np)
-        return np.stack([np.zeros_like(driven), driven], axis=1).ravel()
+        return np.concatenate([np.zeros_like(driven), driven], axis=1).ravel()
 
-
-class StiffnessByImpulses:
-    """R_p^T of all steps, (N, T 2 N)."""
-
-    def __init__(self, w: Array) -> None:
-        self.w = w
-
-    @property
-    def T(self) -> ImpulsesByStiffness:
-        return ImpulsesByStiffness(self.w)
-
-    def __matmul__(self, lam: Array) -> Array:
-        driven = lam.reshape(len(self.w), 2, -1)[:, 1]
-        return np.asarray((self.w * _elongation(driven, np)).sum(axis=0))
+    def each_transposed(self, lam: Array) -> Array:
+        return np.asarray(self.w * _elongation(lam[:, self.w.shape[1] :], np))
 
 
 def _elongation(x: Any, xp: Any) -> Any:

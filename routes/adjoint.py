@@ -28,8 +28,8 @@ Checkpoint = Annotated[
 def cost(n_p: int, forward: ForwardWork, *, factors: str, correct: str = "no", checkpoint: str = WHOLE) -> Work:
     once = work(forward, 1, transposed=True, factors=factors)
     if checkpoint != WHOLE:
-        steps = forward.cold.steps
-        return once + Work(residuals=1, steps=Schedule.of(checkpoint, steps, "adjoint").recomputed(steps))
+        again = Schedule.of(checkpoint, forward.cold.steps, "adjoint").recomputed(forward.cold.steps)
+        return once + Work(residuals=1, steps=again) + forward.marched_again(again)
     return once if correct == "no" else once + correction(forward, factors)
 
 
@@ -47,7 +47,7 @@ def missing(problem: Problem, *, factors: str, correct: str, checkpoint: str) ->
     if not isinstance(problem, Transient):
         return f"adjoint[checkpoint={checkpoint}] marches back in time, {problem.name} has no steps"
     Schedule.of(checkpoint, problem.steps, f"adjoint on {problem.name}")
-    return None if problem.constant else f"adjoint[checkpoint={checkpoint}] needs steps of one matrix"
+    return None
 
 
 @route("adjoint", needs=Offers.LINEARIZE, cost=cost, check=check, missing=missing)

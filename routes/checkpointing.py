@@ -11,18 +11,20 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import comb
 
+import numpy as np
+
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
-March = Callable[[int, Array], Array]  # (t, u_{t-1}) -> u_t
-Step = tuple[int, Array, Array]  # t, u_{t-1}, u_t
+March = Callable[[int, int, Array], Array]  # (t_0, t_1, u_{t_0}) -> u_{t_0}..u_{t_1}, (t_1 - t_0 + 1, n)
+Stretch = tuple[int, Array]  # t_0, u_{t_0}..u_{t_1}
 CHOICES = "whole, all, none, sqrt, every=K or revolve=S"
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """all        every state is kept
-    every      those after 0, k, 2 k, .. steps, and on the way back those of one interval (`sqrt`: k = sqrt(T))
+    """every      those after 0, k, 2 k, .. steps, and on the way back those of one interval; `all`: k = T, `sqrt`:
+               k = sqrt(T)
     revolve    s of them: binomial checkpointing (Griewank & Walther 2000); s = 1 is `none`, the initial state alone
     """
 
@@ -32,7 +34,7 @@ class Schedule:
     @classmethod
     def of(cls, text: str, steps: int, who: str) -> Schedule:
         """From `all`, `none`, `sqrt`, `every=K` or `revolve=S`. Raises InputError."""
-        named = {"all": cls("every", 1), "none": cls("revolve", 1), "sqrt": cls("every", math.isqrt(steps - 1) + 1)}
+        named = {"all": cls("every", steps), "none": cls("revolve", 1), "sqrt": cls("every", math.isqrt(steps - 1) + 1)}
         if text in named:
             return named[text]
         found = re.fullmatch(r"(every|revolve)=(\d{1,9})", text)
@@ -54,52 +56,49 @@ class Schedule:
             r += 1
         return r * steps - comb(s + r, r - 1) - steps + 1 if r else 0
 
-    def backwards(self, march: March, u_0: Array, steps: int) -> Iterator[Step]:
-        """t, u_{t-1} and u_t for t = T..1."""
+    def backwards(self, march: March, u_0: Array, steps: int, together: int = 1) -> Iterator[Stretch]:
+        """t_0 and u_{t_0}..u_{t_1} of steps T..1, `together` steps at once where they are at hand."""
         if self.kind == "every":
-            return by_intervals(march, u_0, steps, self.count)
-        return reverse(march, u_0, 0, steps, self.count, None)
+            yield from by_intervals(march, u_0, steps, self.count, together)
+        else:
+            yield from reverse(march, u_0, 0, steps, self.count, None, together)
 
 
-def by_intervals(march: March, u_0: Array, steps: int, k: int) -> Iterator[Step]:
+def by_intervals(march: March, u_0: Array, steps: int, k: int, together: int) -> Iterator[Stretch]:
     """Steps T..1, with u_0, u_k, u_2k, .. kept, and all states of the interval that is reversed."""
     kept, begin = [u_0], (steps - 1) // k * k
     for first in range(0, begin, k):
-        kept.append(marched(march, kept[-1], first, first + k)[-1])
-    states = marched(march, kept.pop(), begin, steps)
+        kept.append(advanced(march, kept[-1], first, first + k, together))
+    states = march(begin, steps, kept.pop())
     while True:
-        while len(states) > 1:
-            u = states.pop()
-            yield begin + len(states), states[-1], u
+        for first in range(0, len(states) - 1, together)[::-1]:
+            yield begin + first, states[first : first + together + 1]
         if not kept:
             return
         begin -= k
-        states = [*marched(march, kept.pop(), begin, begin + k - 1), states[0]]
+        states = np.concatenate([march(begin, begin + k - 1, kept.pop()), states[:1]])
 
 
-def marched(march: March, u: Array, begin: int, end: int) -> list[Array]:
-    """u_begin..u_end."""
-    states = [u]
-    for t in range(begin + 1, end + 1):
-        states.append(march(t, states[-1]))
-    return states
+def advanced(march: March, u: Array, begin: int, end: int, together: int) -> Array:
+    """u_end from u = u_begin, with no more than `together` states between them."""
+    for first in range(begin, end, together):
+        u = march(first, min(first + together, end), u)[-1]
+    return u
 
 
-def reverse(march: March, u: Array, begin: int, end: int, slots: int, at_end: Array | None) -> Iterator[Step]:
+def reverse(
+    march: March, u: Array, begin: int, end: int, slots: int, at_end: Array | None, together: int
+) -> Iterator[Stretch]:
     """Steps end..begin + 1 from u = u_begin, with `slots` states kept, u among them; at_end: u_end, if it is known."""
     while end > begin:
         ahead = split(end - begin, slots) if slots > 1 else 0
         if ahead:
-            middle = u
-            for t in range(begin + 1, begin + ahead + 1):
-                middle = march(t, middle)
-            yield from reverse(march, middle, begin + ahead, end, slots - 1, at_end)
+            middle = advanced(march, u, begin, begin + ahead, together)
+            yield from reverse(march, middle, begin + ahead, end, slots - 1, at_end, together)
             end, at_end = begin + ahead, middle
             continue
-        before = u
-        for t in range(begin + 1, end):
-            before = march(t, before)
-        yield end, before, march(end, before) if at_end is None else at_end
+        before = advanced(march, u, begin, end - 1, together)
+        yield end - 1, march(end - 1, end, before) if at_end is None else np.stack([before, at_end])
         end, at_end = end - 1, before
 
 

@@ -86,6 +86,17 @@ class ForwardWork:
         assemblies = f if self.matrix_free else (k if directions is None else directions)
         return Work(solves, k, k + solves + cold * self.halvings(), m, assemblies, f, k + m)
 
+    def marched_again(self, steps: int) -> Work:
+        """Newton's method in `steps` steps of a march once more: in proportion, until they are counted."""
+        if self.linear:
+            return Work()
+        k, residuals = self.cold.newton_iterations, self.cold.residuals - 1
+        if self.counted is None:
+            k, residuals = (n * steps // self.cold.steps for n in (k, residuals))
+        else:
+            k, residuals = self.counted.newton_iterations - k, self.counted.residuals - residuals - 2
+        return Work(newton_iterations=k, residuals=residuals, assemblies=k, factorizations=k, solves=k)
+
     def halvings(self) -> int:
         """Residuals that a cold solve's line searches take."""
         return self.cold.residuals - self.cold.newton_iterations - self.cold.forward_solves

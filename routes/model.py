@@ -28,7 +28,7 @@ from gradient_routes.routes.newton_steps import (
 from gradient_routes.routes.precision import double, double_operator
 from gradient_routes.routes.solvers.factorization import Deferred, Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
-from gradient_routes.routes.tally import KINDS, Tally, Work
+from gradient_routes.routes.tally import Tally, Work
 
 
 class Model:
@@ -162,18 +162,29 @@ class Model:
 
     def _marched(self, problem: Transient, p: Array, polish: int, before: Work) -> State:
         """The state after every step, each solved for by full Newton steps to the tolerance of the whole."""
-        u, states, left, solver, tally = problem.initial_state(p), [], 0.0, replace(self.solver, newton="full"), Tally()
-        scale = norm(self.residual(self.initial(p), p))
+        u, states, left, scale = problem.initial_state(p), [], 0.0, self.march_scale(p)
         for t in range(1, problem.steps + 1):
-            step, q = Model(problem.at(t), solver, tally), np.concatenate([u, p])
-            u, history, _ = step._newton(step.initial(q), q, scale, step._direction(q), polish=polish)
+            u, missed = self.march_step(t, u, p, scale, polish)
             states.append(u)
-            left = max(left, history[-1])
-        for kind in KINDS:
-            self.tally.count(kind, vars(tally.work)[kind])
+            left = max(left, missed)
         U = np.concatenate(states)
         factors = Deferred(problem.tangent(U, p).norm, lambda: self.factorize(self.tangent(U, p)))
         return State(p, U, self.objective(U, p), (left,), scale, factors, self.tally.work - before)
+
+    def march_scale(self, p: Array) -> float:
+        """|R|_inf of a march that stays at u_0, to which tolerances of its steps are relative: one residual."""
+        assert isinstance(self.problem, Transient)
+        self.tally.count("residuals")
+        rest, steps, k = self.problem.initial_state(p), self.problem.steps, self.problem.together
+        states = np.tile(rest, (min(k, steps) + 1, 1))
+        return max(norm(self.problem.rows(t, states[: steps - t + 1], p)) for t in range(0, steps, k))
+
+    def march_step(self, t: int, v: Array, p: Array, scale: float, polish: int = 0) -> tuple[Array, float]:
+        """u_t from v = u_{t-1} by full Newton steps, and |R_t|_inf. Raises NotConverged that names the step."""
+        assert isinstance(self.problem, Transient)
+        step, q = Model(self.problem.at(t), replace(self.solver, newton="full"), self.tally), np.concatenate([v, p])
+        u, history, _ = step._newton(step.initial(q), q, scale, step._direction(q), polish=polish)
+        return u, history[-1]
 
     def newton_iterates(self, p: Array, k: int) -> tuple[list[Step], float]:
         """The first k full Newton steps of a cold solve, with its line search, and |R|_inf / |R_0|_inf after them.

@@ -28,11 +28,6 @@ class Recurrence:
     def T(self) -> Recurrence:
         return Recurrence(self.A, self.B, self.steps, not self.transposed)
 
-    @property
-    def constant(self) -> bool:
-        """Whether all steps have the same A_t."""
-        return len(self.A) == 1
-
     def diagonal(self, t: int) -> Any:
         """A_t, t counted from 0."""
         return self.A[0 if len(self.A) == 1 else t]

@@ -23,9 +23,13 @@ class Banded:
         return Banded(self.upper, self.main, self.lower)
 
     def __matmul__(self, v: Array) -> Array:
+        return self.rows(v)
+
+    def rows(self, v: Array) -> Array:
+        """This matrix times every row of v (.., N)."""
         y = np.asarray(self.main * v)
-        y[1:] += self.lower * v[:-1]
-        y[:-1] += self.upper * v[1:]
+        y[..., 1:] += self.lower * v[..., :-1]
+        y[..., :-1] += self.upper * v[..., 1:]
         return y
 
     @property
@@ -34,6 +38,11 @@ class Banded:
         sums[1:] += np.abs(self.lower)
         sums[:-1] += np.abs(self.upper)
         return float(sums.max())
+
+
+def combined(X: Banded, factor: float, Y: Banded) -> Banded:
+    """X + factor Y."""
+    return Banded(X.lower + factor * Y.lower, X.main + factor * Y.main, X.upper + factor * Y.upper)
 
 
 @dataclass(frozen=True)
@@ -60,9 +69,7 @@ class StepMatrix:
     @cached_property
     def schur(self) -> Banded:
         """D - b/a K: what is left for v after u = (r - b v)/a."""
-        by = -self.b / self.a
-        D, K = self.D, self.K
-        return Banded(D.lower + by * K.lower, D.main + by * K.main, D.upper + by * K.upper)
+        return combined(self.D, -self.b / self.a, self.K)
 
     @property
     def dense(self) -> Array:

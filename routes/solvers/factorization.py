@@ -16,9 +16,10 @@ from gradient_routes.problems.matrices.sparse import BlockDiagonal
 from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
-from gradient_routes.routes.solvers.recurrence import RecurrenceFactorization, StepFactorization
+from gradient_routes.routes.solvers.recurrence import RecurrenceFactorization
 from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.solver import Factorization
+from gradient_routes.routes.solvers.step_factorization import StepFactorization
 from gradient_routes.routes.solvers.superlu import SparseFactorization
 from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, TridiagonalFactorization
 
@@ -38,7 +39,7 @@ class Factorizer:
         if isinstance(A, BlockDiagonal):
             return BlockFactorization(A, lambda block: self(block, who))
         if isinstance(A, Recurrence):
-            return RecurrenceFactorization(A, lambda block: self(block, who))
+            return RecurrenceFactorization(A, lambda block: self(block, who), who)
         if isinstance(A, StepMatrix):
             return StepFactorization(A, who) if len(A.K.main) > 2 else DenseFactorization(A.dense, who)
         if self.solver.takes(A):
@@ -73,7 +74,7 @@ class DenseFactorization(Factorization):
     def substitute(self, b: Array, transposed: bool) -> Array:
         from scipy.linalg import lu_solve
 
-        return np.asarray(lu_solve(self.lu, b, trans=1 if transposed else 0))
+        return np.asarray(lu_solve(self.lu, b, trans=1 if transposed else 0, check_finite=False))
 
     @property
     def negative_eigenvalues(self) -> int | None:

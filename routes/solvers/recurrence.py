@@ -7,68 +7,72 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.errors import SingularMatrix
+from gradient_routes.problems.errors import Overflow
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization
+from gradient_routes.routes.solvers.step_factorization import StepFactorization
+from gradient_routes.routes.solvers.step_march import StepMarch
 
 
 class RecurrenceFactorization(Factorization):
-    """Factors of every A_t, one for all where the matrix is constant: A_t z_t = b_t - B_t z_{t-1}."""
+    """Factors of every A_t of A_t z_t + B_t z_{t-1}, one for all where the matrix is constant.
 
-    def __init__(self, A: Recurrence, factorize: Callable[[Any], Factorization]) -> None:
-        self._matrix, self.norm = A, A.norm
+    A march takes as many steps as b (k, n) has rows. They follow step `first`, which is told where they overflow.
+    """
+
+    def __init__(self, A: Recurrence, factorize: Callable[[Any], Factorization], who: str) -> None:
+        self._matrix, self._who, self.norm = A, who, A.norm
         self._blocks = [factorize(block) for block in A.A]
         self.name = f"{self._blocks[0].name}, step by step"
+        self._steps: StepMarch | None = None
+        if len(A.A) < A.steps and isinstance(A.A[0], StepMatrix) and isinstance(self._blocks[0], StepFactorization):
+            self._steps = StepMarch(A.A[0], A.B[0], self._blocks[0].lu)
 
     @property
     def nbytes(self) -> int:
         return sum(block.nbytes for block in self._blocks)
 
-    def substitute(self, b: Array, transposed: bool) -> Array:
-        M, steps = self._matrix, self._matrix.steps
-        b = b.reshape(steps, -1)
-        z: list[Any] = [None] * steps
-        last = len(self._blocks) - 1
-        transposed ^= M.transposed
-        for t in range(steps)[:: -1 if transposed else 1]:
-            r = b[t]
-            if transposed and t + 1 < steps:
-                r = r - M.below(t + 1).T @ z[t + 1]
-            elif not transposed and t:
-                r = r - M.below(t) @ z[t - 1]
-            z[t] = self._blocks[min(t, last)].substitute(r, transposed)
-        return np.concatenate(z)
+    def march(self, b: Array, z: Array, first: int = 0) -> Array:
+        """z_t (k, n) of A_t z_t = b_t - B_t z_{t-1}, from z (n,) before them. Raises Overflow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self._steps is not None:
+                rows = self._steps.forward(b, z)
+            else:
+                rows = np.empty(b.shape, np.result_type(b, z))
+                for t in range(len(b)):
+                    rows[t] = z = self._block(t).substitute(b[t] - self._matrix.below(t) @ z, transposed=False)
+        self._check(rows, first, "state")
+        return rows
 
-
-class StepFactorization(Factorization):
-    """L U of the Schur complement D - b/a K (LAPACK gttrf, real or complex), of three nodes or more: SciPy's interface
-    refuses less.
-    """
-
-    name = "LAPACK tridiagonal L U"
-
-    def __init__(self, A: StepMatrix, who: str) -> None:
-        from scipy.linalg.lapack import get_lapack_funcs
-
-        S = A.schur
-        routines: Any = get_lapack_funcs(("gttrf", "gttrs"), (S.main, S.lower))
-        factor, self._solve = routines
-        *self._lu, info = factor(S.lower, S.main, S.upper)
-        if info:
-            raise SingularMatrix(f"{who}: R_u of a step: pivot {info} is zero - choose another dt")
-        self._A, self.norm = A, A.norm
-
-    @property
-    def nbytes(self) -> int:
-        return sum(int(part.nbytes) for part in self._lu)
+    def march_back(self, b: Array, mu: Array, first: int = 0) -> tuple[Array, Array]:
+        """lam_t (k, n) of A_t^T lam_t = b_t - B_{t+1}^T lam_{t+1}, mu (n,) being the last of these products, and what
+        mu is to the steps before. Raises Overflow.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self._steps is not None:
+                rows, mu = self._steps.backward(b, mu)
+            else:
+                rows = np.empty(b.shape, np.result_type(b, mu))
+                for t in range(len(b))[::-1]:
+                    rows[t] = self._block(t).substitute(b[t] - mu, transposed=True)
+                    mu = self._matrix.below(t).T @ rows[t]
+        self._check(rows, first, "adjoint state")
+        return rows, mu
 
     def substitute(self, b: Array, transposed: bool) -> Array:
-        A, N = self._A, len(b) // 2
-        r, s = b[:N], b[N:]
-        if transposed:
-            y, _ = self._solve(*self._lu, s - (A.b / A.a) * r, trans="T")
-            return np.concatenate([(r - A.K.T @ y) / A.a, y])
-        v, _ = self._solve(*self._lu, s - (A.K @ r) / A.a)
-        return np.concatenate([(r - A.b * v) / A.a, v])
+        b = b.reshape(self._matrix.steps, -1)
+        rest = np.zeros_like(b[0])
+        if transposed ^ self._matrix.transposed:
+            return self.march_back(b, rest)[0].ravel()
+        return self.march(b, rest).ravel()
+
+    def _block(self, t: int) -> Factorization:
+        return self._blocks[t if len(self._blocks) > 1 else 0]
+
+    def _check(self, rows: Array, first: int, what: str) -> None:
+        bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+        if len(bad):
+            t = first + int(bad[0] if what == "state" else bad[-1]) + 1
+            raise Overflow(f"{self._who}: the {what} overflows at step {t} - take smaller or fewer steps")

@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 from conftest import ROUTES, relative_error
 
+from gradient_routes.problems.errors import Overflow
+from gradient_routes.problems.problem import Linearization, Offers, Parameters
+from gradient_routes.problems.transient import Transient
+from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.model import Model
 
@@ -29,6 +33,52 @@ def test_every_route_takes_the_example_of_the_guide(front: Any) -> None:
     for route in ROUTES:
         found = route.prepare(model, p)(p)
         assert relative_error(found.gradient, exact) < (route.accuracy or 1e-13), route.name
+
+
+@pytest.mark.parametrize("checkpoint", ["all", "sqrt", "none", "revolve=2"])
+def test_both_shares_come_back_from_few_states(front: Any, checkpoint: str) -> None:
+    """Nonlinear steps: marched again by the same Newton steps, factorized again on the way back."""
+    model, p = Model(front), front.parameters.start
+    exact = complex_step.prepare(model, p)(p).gradient
+    found = adjoint.prepare(Model(front), p, checkpoint=checkpoint)(p)
+    assert relative_error(found.gradient, exact) < 1e-13
+    kept = adjoint.prepare(Model(front), p, checkpoint="all")(p)
+    np.testing.assert_array_equal(found.gradient, kept.gradient)
+
+
+class Growth(Transient):
+    """u_t = g u_{t-1}, which exceeds every number."""
+
+    name = "growth"
+    offers = Offers.LINEARIZE
+    linear = constant = True
+    parameters = Parameters(start=np.array([1e100]), scale=np.array([1.0]))
+    steps = n_state = 8
+
+    def initial_state(self, p: Any, xp: Any = np) -> Any:
+        return np.ones(1, p.dtype)
+
+    def step_residual(self, t: Any, u: Any, v: Any, p: Any, xp: Any = np) -> Any:
+        return u - p[0] * v
+
+    def step_tangent(self, t: int, u: Any, v: Any, p: Any) -> Any:
+        return np.eye(1)
+
+    def step_coupling(self, t: int, u: Any, v: Any, p: Any) -> Any:
+        return -p[0] * np.eye(1)
+
+    def step_objective(self, t: Any, u: Any, p: Any, xp: Any = np) -> Any:
+        return u[0]
+
+    def step_linearize(self, t: int, u: Any, v: Any, p: Any) -> Linearization:
+        return Linearization(-v[:, None], np.ones(1), np.zeros(1))
+
+
+@pytest.mark.parametrize("checkpoint", ["whole", "all", "revolve=2"])
+def test_a_state_that_overflows_is_told_with_its_step(checkpoint: str) -> None:
+    model = Model(Growth())
+    with pytest.raises(Overflow, match="growth: the state overflows at step 4 - take"):
+        adjoint.prepare(model, Growth.parameters.start, checkpoint=checkpoint)(Growth.parameters.start)
 
 
 def test_the_rows_of_the_march_are_those_of_its_steps(front: Any) -> None:

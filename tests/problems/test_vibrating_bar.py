@@ -10,7 +10,7 @@ from conftest import ROUTES, relative_error
 from scipy.integrate import solve_ivp
 
 from gradient_routes.problems.errors import DomainError, InputError
-from gradient_routes.problems.vibrating_bar import VibratingBar
+from gradient_routes.problems.vibrating_bar import GAP, VibratingBar
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.finite_difference import fd_central
@@ -167,10 +167,11 @@ def test_a_step_is_a_problem_whose_rows_are_those_of_the_march(stop: str) -> Non
         np.testing.assert_allclose(step.tangent(z[t], q) @ dz, by_u, atol=1e-13)
 
 
+@pytest.mark.parametrize("stop", ["none", "softplus"])
 @pytest.mark.parametrize("checkpoint", ["all", "none", "sqrt", "every=5", "revolve=2", "revolve=12"])
-def test_checkpoints_change_memory_and_steps_not_the_gradient(checkpoint: str) -> None:
+def test_checkpoints_change_memory_and_steps_not_the_gradient(checkpoint: str, stop: str) -> None:
     """Bitwise: the same operations on the same states."""
-    bar = made(scheme="newmark", damping="skew", alpha=0.1)
+    bar = made(scheme="newmark", damping="skew", alpha=0.1, stop=stop, gap=0.05 if stop == "softplus" else GAP)
     p = bar.parameters.start + 0.1
     kept = adjoint.prepare(Model(bar), p, checkpoint="all")(p)
     model = Model(bar)
@@ -182,6 +183,16 @@ def test_checkpoints_change_memory_and_steps_not_the_gradient(checkpoint: str) -
     assert found.J == pytest.approx(whole.J, rel=1e-13)
     again = {"all": 0, "none": 55, "sqrt": 6, "every=5": 8, "revolve=2": 17, "revolve=12": 0}
     assert model.tally.work.steps == 12 + again[checkpoint]
+
+
+def test_steps_marched_again_are_declared(cli) -> None:
+    routes = "adjoint[checkpoint=all|sqrt|every=2|none|revolve=2]"
+    for problem in ("vibrating-bar[n=3,steps=6]", "vibrating-bar[n=3,steps=6,stop=softplus,gap=0.001]"):
+        rows = cli("run", "--json", "--no-store", "--no-timing", "--problem", problem, "--route", routes).rows
+        assert [row["status"] for row in rows] == 5 * ["ok"]
+        assert [row["work"]["steps"] for row in rows] == [6, 8, 8, 16, 9]
+        for row in rows:
+            assert row["work"] == row["predicted_work"], (problem, row["route"])
 
 
 def test_an_explicit_step_beyond_its_limit_is_refused() -> None:

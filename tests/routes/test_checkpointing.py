@@ -11,17 +11,21 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.checkpointing import Schedule
 
 
-def steps_of(text: str, T: int) -> int:
+def steps_of(text: str, T: int, together: int = 1) -> int:
     """Steps marched by a schedule whose states are their own numbers."""
     marched = []
 
-    def march(t: int, before: np.ndarray) -> np.ndarray:
-        assert before[0] == t - 1
-        marched.append(t)
-        return np.array([t])
+    def march(t_0: int, t_1: int, before: np.ndarray) -> np.ndarray:
+        assert before[0] == t_0
+        marched.extend(range(t_0, t_1))
+        return np.arange(t_0, t_1 + 1)[:, None]
 
-    seen = Schedule.of(text, T, "march").backwards(march, np.array([0]), T)
-    assert [(t, int(before[0]), int(u[0])) for t, before, u in seen] == [(t, t - 1, t) for t in range(T, 0, -1)]
+    seen = []
+    for t_0, states in Schedule.of(text, T, "march").backwards(march, np.array([0]), T, together):
+        assert 2 <= len(states) <= together + 1
+        assert states[:, 0].tolist() == [*range(t_0, t_0 + len(states))]
+        seen += [*range(t_0 + 1, t_0 + len(states))][::-1]
+    assert seen == [*range(T, 0, -1)]
     return len(marched)
 
 
@@ -42,7 +46,8 @@ def test_steps_are_those_of_the_formula_and_the_fewest_there_can_be(T: int) -> N
         assert steps_of(f"revolve={s}", T) == T + again == fewest(T, s) + 1
     for k in range(1, T + 1):
         assert steps_of(f"every={k}", T) == T + (k - 1) * ((T - 1) // k)
-    assert steps_of("all", T) == T
+        assert steps_of(f"every={k}", T, together=4) == T + (k - 1) * ((T - 1) // k)
+    assert steps_of("all", T, together=3) == T
     assert steps_of("none", T) == T + (T - 1) * (T - 2) // 2
 
 

@@ -1,0 +1,49 @@
+"""What the backward march needs of some steps in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from gradient_routes.problems.problem import Array, Operator
+
+
+class StepRows(Operator, Protocol):
+    """R_p (k n, n_p) of k steps, one below the other."""
+
+    def each_transposed(self, lam: Array) -> Array:
+        """R_p^T lam of every step by itself, (k, n_p), from lam (k, n)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rates:
+    """J (k,) of k steps and their partial derivatives: R_p (k n, n_p), J_u (k, n), J_p (k, n_p)."""
+
+    J: Array
+    R_p: StepRows
+    J_u: Array
+    J_p: Array
+
+
+class Stacked:
+    """Operators with n rows each, the last with as many or fewer, one below the other."""
+
+    def __init__(self, blocks: Sequence[Operator], n: int, transposed: bool = False) -> None:
+        self.blocks, self.n, self.transposed = blocks, n, transposed
+
+    @property
+    def T(self) -> Stacked:
+        return Stacked(self.blocks, self.n, not self.transposed)
+
+    def __matmul__(self, x: Array) -> Any:
+        if self.transposed:
+            parts = (x[i * self.n : (i + 1) * self.n] for i in range(len(self.blocks)))
+            return sum(block.T @ part for block, part in zip(self.blocks, parts, strict=True))
+        return np.concatenate([block @ x for block in self.blocks])
+
+    def each_transposed(self, lam: Array) -> Array:
+        return np.stack([block.T @ part for block, part in zip(self.blocks, lam, strict=True)])
