@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.problem import Array, Operator
 
 
-class StepRows(Operator, Protocol):
-    """R_p (k n, n_p) of k steps, one below the other."""
-
-    def each_transposed(self, lam: Array) -> Array:
-        """R_p^T lam of every step by itself, (k, n_p), from lam (k, n)."""
-        ...
-
-
 @dataclass(frozen=True)
 class Rates:
-    """J (k,) of k steps and their partial derivatives: R_p (k n, n_p), J_u (k, n), J_p (k, n_p)."""
+    """J (k,) of k steps and their partial derivatives.
+
+    J_u (k, n), J_p (k, n_p)
+    by_p  lam (k, n) -> R_p^T lam of every step by itself, (k, n_p)
+    R_p   (k n, n_p), where it is known as an operator
+    """
 
     J: Array
-    R_p: StepRows
     J_u: Array
     J_p: Array
+    by_p: Callable[[Array], Array]
+    R_p: Operator | None = None
 
 
 class Stacked:
@@ -46,4 +44,5 @@ class Stacked:
         return np.concatenate([block @ x for block in self.blocks])
 
     def each_transposed(self, lam: Array) -> Array:
+        """block^T lam of every block, (k, n_p), from lam (k, n)."""
         return np.stack([block.T @ part for block, part in zip(self.blocks, lam, strict=True)])

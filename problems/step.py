@@ -45,7 +45,7 @@ class Step(Problem):
         return q[: self.n_state], q[self.n_state :]
 
     def initial(self, p: Array) -> Array:
-        return self.march.step_initial(self.t, *self.split(p))
+        return np.asarray(self.march.step_initial(self.t, *self.split(p)))
 
     def residual(self, u: Array, p: Array) -> Array:
         return np.asarray(self.march.step_residual(self.t, u, *self.split(p)))

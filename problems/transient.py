@@ -52,7 +52,7 @@ class Transient(Problem):
         """R_p, J_u and J_p of the step, without alpha Phi."""
         raise NotOffered(f"{self.name}: offers no partial derivatives of a step")
 
-    def step_initial(self, t: int, v: Array, p: Array) -> Array:
+    def step_initial(self, t: Any, v: Any, p: Any, xp: Any = np) -> Any:
         """Where Newton's method for u_t starts: v, or a prediction that satisfies the rows that are linear."""
         return v
 
@@ -68,6 +68,11 @@ class Transient(Problem):
         """du_0/dp (n, n_p); None where u_0 does not depend on p."""
         return None
 
+    def pulled_to_initial(self, mu: Array, p: Array) -> Array:
+        """(du_0/dp)^T mu, (n_p,)."""
+        by = self.initial_by(p)
+        return np.zeros_like(p) if by is None else np.asarray(by.T @ mu)
+
     def phi(self, p: Any, xp: Any = np) -> Any:
         """alpha Phi(p)."""
         return 0.0
@@ -82,12 +87,17 @@ class Transient(Problem):
         """R (k, n) of steps t_0 + 1..t_0 + k, from states (k + 1, n): u_{t_0}, .., u_{t_0 + k}."""
         return np.stack([self.step_residual(t, u, v, p) for t, u, v in stepwise(t_0, states)])
 
+    def loads(self, t_0: int, k: int, p: Array) -> Array:
+        """b (k, n) of steps t_0 + 1..t_0 + k where R_t = R_u u + R_v v - b_t."""
+        return -self.rows(t_0, np.zeros((k + 1, self.n_step), p.dtype), p)
+
     def rates(self, t_0: int, states: Array, p: Array) -> Rates:
         """J and the partial derivatives of these steps, without alpha Phi."""
         each = [self.step_linearize(t, u, v, p) for t, u, v in stepwise(t_0, states)]
         J = np.array([self.step_objective(t, u, p) for t, u, _ in stepwise(t_0, states)])
         R_p, J_u, J_p = zip(*((lin.R_p, lin.J_u, lin.J_p) for lin in each), strict=True)
-        return Rates(J, Stacked(R_p, states.shape[1]), np.stack(J_u), np.stack(J_p))
+        rows = Stacked(R_p, states.shape[1])
+        return Rates(J, np.stack(J_u), np.stack(J_p), rows.each_transposed, rows)
 
     # --- the march: what follows
 
@@ -136,7 +146,7 @@ class Transient(Problem):
 
     def linearize(self, u: Array, p: Array) -> Linearization:
         each = [self.rates(t_0, states, p) for t_0, states in self.stretches(u, p)]
-        R_p = Stacked([one.R_p for one in each], self.n_step * self.together)
+        R_p = Stacked([one.R_p for one in each if one.R_p is not None], self.n_step * self.together)
         J_p = sum((one.J_p.sum(axis=0) for one in each), self.phi_by(p))
         J_u = np.concatenate([one.J_u.ravel() for one in each])
         return Linearization(self._with_initial(R_p, u, p), J_u, J_p)
@@ -153,7 +163,7 @@ class Transient(Problem):
             y[:n] += R_v @ (by @ dp)
             return y
 
-        return ByProducts(forward, lambda lam: R_p.T @ lam + by.T @ (R_v.T @ lam[:n]))
+        return ByProducts(forward, lambda lam: R_p.T @ lam + self.pulled_to_initial(R_v.T @ lam[:n], p))
 
     def traced(self) -> Traced:
         """R and J of all steps by one trace of a step."""

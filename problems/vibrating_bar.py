@@ -228,12 +228,13 @@ class VibratingBar(Transient):
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
         rates = self.rates(t - 1, np.stack([v, u]), p)
+        assert rates.R_p is not None
         return Linearization(rates.R_p, rates.J_u[0], rates.J_p[0])
 
-    def step_initial(self, t: int, v: Array, p: Array) -> Array:
+    def step_initial(self, t: Any, v: Any, p: Any, xp: Any = np) -> Any:
         """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
         x, velocity = v.reshape(2, -1)
-        return np.concatenate([x + self.h * velocity, velocity])
+        return xp.concatenate([x + self.h * velocity, velocity])
 
     def step_active_set(self, t: int, u: Array, p: Array) -> str | None:
         return None if self.stop is None else self.stop.law.active_set(u[self.n - 1] - self.stop.gap)
@@ -265,11 +266,17 @@ class VibratingBar(Transient):
                 " p - choose a smaller dt or another scheme"
             )
 
+    def loads(self, t_0: int, k: int, p: Array) -> Array:
+        b = np.zeros((k, self.n_step), p.dtype)
+        b[:, -1] = self.h * self.scheme.force(self.F[t_0 : t_0 + k + 1])
+        return b
+
     def rates(self, t_0: int, states: Array, p: Array) -> Rates:
         J_u, off = np.zeros_like(states[1:]), states[1:, self.nodes - 1] - self.data()[t_0 : t_0 + len(states) - 1]
         J_u[:, self.nodes - 1] = off
         J_p = np.broadcast_to(np.zeros_like(p), (len(J_u), len(p)))
-        return Rates(0.5 * (off**2).sum(axis=1), self.by_modulus(*self.histories(states), p), J_u, J_p)
+        R_p = self.by_modulus(*self.histories(states), p)
+        return Rates(0.5 * (off**2).sum(axis=1), J_u, J_p, R_p.each_transposed, R_p)
 
     def by_modulus(self, x: Array, v: Array, p: Array) -> ImpulsesByStiffness:
         """R_p of m steps, from displacements and velocities (m + 1, N) before and after them."""

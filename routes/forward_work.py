@@ -97,6 +97,12 @@ class ForwardWork:
             k, residuals = self.counted.newton_iterations - k, self.counted.residuals - residuals - 2
         return Work(newton_iterations=k, residuals=residuals, assemblies=k, factorizations=k, solves=k)
 
+    def marched_iterates(self, k: int, steps: int, again: int) -> Work:
+        """k Newton steps in every step of a march, `again` of these taken twice, and k transposed solves in each."""
+        newton = k * (steps + again)
+        residuals = 1 + newton + steps + again if self.counted is None else self.counted.residuals
+        return Work(1, newton, residuals, 0, newton, newton, newton, k * steps, steps + again)
+
     def halvings(self) -> int:
         """Residuals that a cold solve's line searches take."""
         return self.cold.residuals - self.cold.newton_iterations - self.cold.forward_solves

@@ -14,6 +14,23 @@ from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.recurrence import RecurrenceFactorization
 
 
+def marched_again(steps: int, interval: int | None) -> int:
+    """Steps that are taken once more where states at 0, k, 2 k, .. are kept: all but those of the last interval."""
+    return 0 if interval is None else (steps - 1) // interval * interval
+
+
+def most_newton_steps(model: Model, p: Array) -> int:
+    """The largest number of Newton steps in a step in time. Raises NotConverged."""
+    assert isinstance(model.problem, Transient)
+    counted, most = Model(model.problem, model.solver), 1
+    u, scale = model.problem.initial_state(p), counted.march_scale(p)
+    for t in range(1, model.problem.steps + 1):
+        before = counted.tally.work.newton_iterations
+        u, _ = counted.march_step(t, u, p, scale)
+        most = max(most, counted.tally.work.newton_iterations - before)
+    return most
+
+
 class March:
     """(t_0, t_1, u_{t_0}) -> u_{t_0}..u_{t_1}, (t_1 - t_0 + 1, n), and `back`.
 
@@ -57,9 +74,8 @@ class March:
             return states
         k = self.problem.together
         for begin in range(0, t_1 - t_0, k):
-            rest = np.zeros((min(k, t_1 - t_0 - begin) + 1, len(u)), u.dtype)
-            b = -self.problem.rows(t_0 + begin, rest, self.p)
-            states[begin + 1 : begin + len(rest)] = self.factors.march(b, states[begin], t_0 + begin)
+            b = self.problem.loads(t_0 + begin, min(k, t_1 - t_0 - begin), self.p)
+            states[begin + 1 : begin + len(b) + 1] = self.factors.march(b, states[begin], t_0 + begin)
         return states
 
     def back(self, t_0: int, states: Array, b: Array, mu: Array) -> tuple[Array, Array]:

@@ -186,6 +186,13 @@ class Model:
         u, history, _ = step._newton(step.initial(q), q, scale, step._direction(q), polish=polish)
         return u, history[-1]
 
+    def march_iterates(self, t: int, v: Array, p: Array, scale: float, k: int) -> tuple[list[Step], float]:
+        """The first k full Newton steps to u_t from v = u_{t-1}, see `newton_iterates`, and |R_t|_inf after them."""
+        assert isinstance(self.problem, Transient)
+        step, q = Model(self.problem.at(t), replace(self.solver, newton="full"), self.tally), np.concatenate([v, p])
+        steps, history = step._iterates(q, step.initial(q), scale, k)
+        return steps, history[-1]
+
     def newton_iterates(self, p: Array, k: int) -> tuple[list[Step], float]:
         """The first k full Newton steps of a cold solve, with its line search, and |R|_inf / |R_0|_inf after them.
 
@@ -194,14 +201,18 @@ class Model:
         """
         self.tally.count("forward_solves")
         self.tally.count("steps", self.problem.steps)
+        steps, history = self._iterates(p, self.initial(p), None, k)
+        return steps, history[-1] / (history[0] or 1.0)
+
+    def _iterates(self, p: Array, u: Array, scale: float | None, k: int) -> tuple[list[Step], tuple[float, ...]]:
         steps = Recorded(self._operations(p))
         try:
-            self._newton(self.initial(p), p, None, steps, polish=k, at_most=k, taken=steps.taken)
+            _, history, _ = self._newton(u, p, scale, steps, polish=k, at_most=k, taken=steps.taken)
         except NotConverged as end:
             if len(steps.steps) < k:
                 raise
             history = end.history
-        return steps.steps, history[-1] / (history[0] or 1.0)
+        return steps.steps, history
 
     @property
     def newton(self) -> Newton:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import InputError, Overflow
 from gradient_routes.problems.problem import Array, Problem
+from gradient_routes.routes.march import marched_again, most_newton_steps
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.route import Affordable, ForwardWork, Gradient, Offers, Options, Result, Work, route
 
@@ -35,6 +36,9 @@ NEVER = 10**15  # largest estimate of k: more than any machine can do
 def cost(
     n_p: int, forward: ForwardWork, *, inner: str | None, iterations: int, newton: int | None, checkpoint: int | None
 ) -> Work:
+    if inner == "direct" and marches(forward.cold.steps, forward.linear, checkpoint):
+        again = marched_again(forward.cold.steps, checkpoint)
+        return forward.marched_iterates(iterations, forward.cold.steps, again)
     if inner == "direct":
         k, known = iterations, forward.counted
         residuals = 1 + k + forward.halvings() if known is None else known.residuals
@@ -49,11 +53,8 @@ def check(*, inner: str | None, iterations: int | None, newton: int | None, chec
     for name, count in (("iterations", iterations), ("newton", newton), ("checkpoint", checkpoint)):
         if count is not None and count < 1:
             raise InputError(f"unrolled-ad: {name}={count} - choose at least 1")
-    if inner == "direct" and (newton, checkpoint) != (None, None):
-        raise InputError(
-            "unrolled-ad: inner=direct counts its Newton steps by iterations= and keeps them all - give neither newton="
-            " nor checkpoint="
-        )
+    if inner == "direct" and newton is not None:
+        raise InputError("unrolled-ad: inner=direct counts its Newton steps by iterations= - leave newton= out")
 
 
 def chosen(problem: Problem, inner: str | None) -> str:
@@ -61,10 +62,20 @@ def chosen(problem: Problem, inner: str | None) -> str:
     return inner or ("cg" if by_cg else "direct")
 
 
+def marches(steps: int, linear: bool, checkpoint: int | None) -> bool:
+    """Whether a problem's steps in time are unrolled one by one: a linear march is one Newton step of all of them."""
+    return bool(steps) and not (linear and checkpoint is None)
+
+
 def missing(
     problem: Problem, *, inner: str | None, iterations: int | None, newton: int | None, checkpoint: int | None
 ) -> str | None:
     inner = chosen(problem, inner)
+    if inner == "direct" and checkpoint is not None:
+        if problem.steps >= checkpoint:
+            return None
+        steps = f"{problem.steps} in time" if problem.steps else "none in time"
+        return f"unrolled-ad[inner=direct,checkpoint={checkpoint}] keeps states of so many steps, there are {steps}"
     if inner == "direct":
         return None
     if inner == "cg" and problem.structure != "spd":
@@ -115,6 +126,8 @@ def resolve(
     On nonlinear problems k is the larger number of the linear systems at the first and the last Newton step.
     """
     problem, inner = model.problem, chosen(model.problem, inner)
+    if inner == "direct" and problem.steps and not problem.linear and iterations is None:
+        iterations = most_newton_steps(model, p)
     state = None if problem.linear else Model(problem, replace(model.solver, newton="full")).solve(p)
     steps = 1 if state is None else state.work.newton_iterations
     if inner != "direct" and not problem.linear:
@@ -179,6 +192,8 @@ def unrolled_ad(
 ) -> Gradient:
     """dJ(u_k(p), p)/dp by backprop through all k solver iterations: the gradient of the k-th iterate."""
     assert iterations is not None  # Route.prepare resolves it
+    if inner == "direct" and marches(model.problem.steps, model.problem.linear, checkpoint):
+        return through_march(model, iterations, checkpoint)
     if inner == "direct":
         return through_newton(model, iterations)
     return through_iterations(model, p, str(inner), iterations, newton or 1, checkpoint)
@@ -231,6 +246,20 @@ def through_newton(model: Model, k: int) -> Gradient:
         J, pullback, u = jax.vjp(with_state, p, has_aux=True)
         tape = held_bytes(pullback) + sum(step.factors.nbytes for step in steps)
         return finished(u, J, pullback(1.0)[0], residual, tape, f"{k} Newton steps")
+
+    return gradient
+
+
+def through_march(model: Model, k: int, checkpoint: int | None) -> Gradient:
+    """The same in every step in time, one after another."""
+    from gradient_routes.routes.unrolled_march import UnrolledMarch
+
+    sweep = UnrolledMarch(model, k, checkpoint)
+
+    def gradient(p: Array) -> Result:
+        found = sweep(p)
+        left, tape = found.residual or 0.0, found.tape or 0
+        return finished(found.u, found.J, found.gradient, left, tape, f"{k} Newton steps in every step")
 
     return gradient
 

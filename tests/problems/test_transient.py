@@ -15,7 +15,9 @@ from gradient_routes.problems.problem import Linearization, Offers, Parameters
 from gradient_routes.problems.transient import Transient
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
+from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.unrolled_ad import unrolled_ad
 
 FRONT = Path(__file__).parents[2] / "examples" / "transient" / "front.py"
 
@@ -35,15 +37,41 @@ def test_every_route_takes_the_example_of_the_guide(front: Any) -> None:
         assert relative_error(found.gradient, exact) < (route.accuracy or 1e-13), route.name
 
 
-@pytest.mark.parametrize("checkpoint", ["all", "sqrt", "none", "revolve=2"])
-def test_both_shares_come_back_from_few_states(front: Any, checkpoint: str) -> None:
+@pytest.mark.parametrize("route", [adjoint, implicit_ad])
+def test_both_shares_come_back_from_few_states(front: Any, route: Any) -> None:
     """Nonlinear steps: marched again by the same Newton steps, factorized again on the way back."""
-    model, p = Model(front), front.parameters.start
-    exact = complex_step.prepare(model, p)(p).gradient
-    found = adjoint.prepare(Model(front), p, checkpoint=checkpoint)(p)
-    assert relative_error(found.gradient, exact) < 1e-13
-    kept = adjoint.prepare(Model(front), p, checkpoint="all")(p)
-    np.testing.assert_array_equal(found.gradient, kept.gradient)
+    p = front.parameters.start
+    exact = complex_step.prepare(Model(front), p)(p).gradient
+    kept = route.prepare(Model(front), p, checkpoint="all")(p)
+    assert relative_error(kept.gradient, exact) < 1e-13
+    for checkpoint in ("sqrt", "none", "revolve=2"):
+        found = route.prepare(Model(front), p, checkpoint=checkpoint)(p)
+        np.testing.assert_array_equal(found.gradient, kept.gradient)
+
+
+@pytest.mark.parametrize("iterations", [1, 3])
+def test_unrolled_steps_give_the_gradient_of_their_iterates(front: Any, iterations: int) -> None:
+    """Central differences of J after k Newton steps in every step, whose prediction is the state before."""
+    p = front.parameters.start
+
+    def J_k(p: Any) -> float:
+        u, J = front.initial_state(p), 0.0
+        for t in range(1, front.steps + 1):
+            v = u
+            for _ in range(iterations):
+                R_u = front.step_tangent(t, u, v, p).toarray()
+                u = u - np.linalg.solve(R_u, front.step_residual(t, u, v, p))
+            J += front.step_objective(t, u, p)
+        return float(J)
+
+    h = 1e-6 * p
+    fd = np.array([(J_k(p + d) - J_k(p - d)) / (2.0 * d.sum()) for d in np.diag(h)])
+    kept = unrolled_ad.prepare(Model(front), p, iterations=iterations)(p)
+    assert kept.J == pytest.approx(J_k(p), rel=1e-13)
+    assert relative_error(kept.gradient, fd) < 1e-8  # h^2, and eps J / h
+    few = unrolled_ad.prepare(Model(front), p, iterations=iterations, checkpoint=2)(p)
+    np.testing.assert_array_equal(few.gradient, kept.gradient)
+    assert few.tape < kept.tape
 
 
 class Growth(Transient):

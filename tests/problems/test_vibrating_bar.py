@@ -19,6 +19,7 @@ from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.synthetic_data import with_synthetic_data
 from gradient_routes.routes.tangent import tangent
+from gradient_routes.routes.unrolled_ad import unrolled_ad
 
 SCHEMES = ("newmark", "backward-euler", "central-difference")
 DAMPINGS: dict[str, dict[str, Any]] = {
@@ -105,7 +106,7 @@ def test_gradients_hold_where_the_tip_meets_a_stop(scheme: str, stop: str) -> No
     closed = model.solve(p).u.reshape(16, 2, 4)[:, 0, -1] > 0.05
     assert np.diff(closed.astype(int)).min() < 0 < closed.sum()
     exact = complex_step.prepare(model, p)(p).gradient
-    for route in (tangent, adjoint, implicit_ad):
+    for route in (tangent, adjoint, implicit_ad, unrolled_ad):
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
 
 
@@ -186,11 +187,12 @@ def test_checkpoints_change_memory_and_steps_not_the_gradient(checkpoint: str, s
 
 
 def test_steps_marched_again_are_declared(cli) -> None:
-    routes = "adjoint[checkpoint=all|sqrt|every=2|none|revolve=2]"
+    routes = "adjoint[checkpoint=all|sqrt|every=2|none|revolve=2]", "unrolled-ad[inner=direct,checkpoint=4]"
+    by = ("--route", routes[0], "--route", routes[1])
     for problem in ("vibrating-bar[n=3,steps=6]", "vibrating-bar[n=3,steps=6,stop=softplus,gap=0.001]"):
-        rows = cli("run", "--json", "--no-store", "--no-timing", "--problem", problem, "--route", routes).rows
-        assert [row["status"] for row in rows] == 5 * ["ok"]
-        assert [row["work"]["steps"] for row in rows] == [6, 8, 8, 16, 9]
+        rows = cli("run", "--json", "--no-store", "--no-timing", "--problem", problem, *by).rows
+        assert [row["status"] for row in rows] == 6 * ["ok"]
+        assert [row["work"]["steps"] for row in rows] == [6, 8, 8, 16, 9, 10]
         for row in rows:
             assert row["work"] == row["predicted_work"], (problem, row["route"])
 
