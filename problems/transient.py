@@ -14,7 +14,7 @@ from gradient_routes.problems.problem import Array, Linearization, Operator, Pro
 from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
 
-CACHED = 4096  # numbers of an array of states that stay in a cache with a dozen others like it
+CACHED = 2048  # numbers of an array of states that stay in a cache with a dozen others like it
 
 
 class Transient(Problem):

@@ -69,20 +69,23 @@ def by_intervals(march: March, u_0: Array, steps: int, k: int, together: int) ->
     kept, begin = [u_0], (steps - 1) // k * k
     for first in range(0, begin, k):
         kept.append(advanced(march, kept[-1], first, first + k, together))
-    states = march(begin, steps, kept.pop())
+    states, after = march(begin, steps, kept.pop()), np.empty((0, len(u_0)))  # after: u_end, where it is not in states
     while True:
-        for first in range(0, len(states) - 1, together)[::-1]:
-            yield begin + first, states[first : first + together + 1]
+        for first in range(0, len(states) + len(after) - 1, together)[::-1]:
+            at_hand = states[first : first + together + 1]
+            yield begin + first, np.concatenate([at_hand, after]) if len(at_hand) <= together else at_hand.copy()
         if not kept:
             return
         begin -= k
-        states = np.concatenate([march(begin, begin + k - 1, kept.pop()), states[:1]])
+        after = states[:1].copy()
+        del states, at_hand  # before others take their place
+        states = march(begin, begin + k - 1, kept.pop())
 
 
 def advanced(march: March, u: Array, begin: int, end: int, together: int) -> Array:
     """u_end from u = u_begin, with no more than `together` states between them."""
     for first in range(begin, end, together):
-        u = march(first, min(first + together, end), u)[-1]
+        u = march(first, min(first + together, end), u)[-1].copy()  # a view would keep them all
     return u
 
 

@@ -266,4 +266,6 @@ def test_wrong_iterations_are_wrong_usage() -> None:
         with pytest.raises(InputError, match="choose at least 1"):
             unrolled_ad.check(inner="cg", iterations=None, newton=None, checkpoint=k)
     with pytest.raises(InputError, match="inner=direct"):
-        unrolled_ad.check(inner="direct", iterations=None, newton=None, checkpoint=2)
+        unrolled_ad.check(inner="direct", iterations=None, newton=2, checkpoint=None)
+    keeps = {"inner": "direct", "iterations": None, "newton": None, "checkpoint": 2}
+    assert "there are none in time" in str(unrolled_ad.missing(Bar(n=3), **keeps))
