@@ -163,7 +163,7 @@ class Advection(Problem):
 
     def _R_p(self, by_cell: Array, kappa: Array) -> Any:
         """Columns dR_e/dp_e from dR_e/dkappa_e or dR_e/df_e, (n_e, 4)."""
-        return self.supg.cellwise_columns(by_cell * kappa[:, None] if self.log else by_cell)
+        return self.supg.cells.columns(by_cell * kappa[:, None] if self.log else by_cell)
 
     def _misfit(self, u: Array) -> Array:
         """u - d at the sensor nodes, 0 elsewhere, (n_u,)."""
@@ -207,8 +207,8 @@ class Advection(Problem):
         """
         kappa, _ = self.coefficients(p)
         A = self.supg.pattern.assemble(_transposed(self.supg, kappa))
-        dR_df = np.broadcast_to(-self.supg.m, self.supg.dofs.shape)
-        return A, self._R_p(dR_df if self.source_unknown else self.supg.at_corners(u) @ self.supg.D, kappa)
+        dR_df = np.broadcast_to(-self.supg.m, self.supg.cells.dofs.shape)
+        return A, self._R_p(dR_df if self.source_unknown else self.supg.cells.gather(u) @ self.supg.D, kappa)
 
     def inconsistent_adjoint(self, u: Array, p: Array, other: Discretization) -> tuple[Any, Operator, Array] | None:
         """By the quadrature at corners, without streamline terms, or on a mesh of twice the mesh size (n even)."""
