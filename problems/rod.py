@@ -20,7 +20,7 @@ from gradient_routes.problems.data.thermocouples import Line, read_thermocouples
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.heat.fin import Fin, check_given, value
-from gradient_routes.problems.heat.unknowns import Unknowns
+from gradient_routes.problems.heat.unknowns import Parts, Unknowns
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
 from gradient_routes.problems.problem import (
     Array,
@@ -116,7 +116,8 @@ class Rod(Problem):
             self.fin.check_reach(self.sizes, float(x.min()))
         self.sensors = Line.through(x, self.fin.L, n)
         self.part = np.arange(n) * parts // n  # (N,) of every element
-        self.unknowns = Unknowns.of(names, self.sizes, parts, parametrization == "log")
+        each = {"film": Parts.line(parts), "conductivity": Parts.line(parts), "flux": Parts.point()}
+        self.unknowns = Unknowns.of(names, self.sizes, each, parametrization == "log")
         self.parameters = self.unknowns.parameters(self.fin.L)
         self.regularization = Prior(alpha, phi, phi_width, self.unknowns.neighbours)
         self.regularization.check("rod")
