@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import copy
 import math
-import re
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
-from gradient_routes.problems.data.thermocouples import Line, read_thermocouples
+from gradient_routes.problems.data.thermocouples import Line, check_celsius, read_thermocouples
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.heat.fin import Fin, check_given, value
@@ -232,10 +231,8 @@ class Rod(Problem):
         """Sets the data, their noise and notes from a file; x (m,) of its thermocouples."""
         given = self._given
         read = read_thermocouples(path, self.fin.L, given["columns"], given["units"], self.noise)
-        for name in ("ambient", "base", "tip"):
-            value = str(given[name])
-            if read.celsius and re.fullmatch(r"[-+.\de]+", value):
-                raise InputError(f"rod: {name}={value} has no unit, T of {path} is in degC - write {value}degC")
+        if read.celsius:
+            check_celsius("rod", given, ("ambient", "base", "tip"), path)
         self.measured = True
         self.d, self.noise, self.read_as = read.T - self.fin.T_inf, read.sigma, read.notes
         return read.x

@@ -137,6 +137,7 @@ ORDER = (
     "rod",
     "coupon",
     "advection",
+    "heat",
     "vibrating-bar",
     "fd-one-sided",
     "fd-central",
