@@ -121,6 +121,7 @@ class Heat(FirstOrder):
         dofs = np.where(self.solid.free, np.cumsum(self.solid.free) - 1, -1)[placed.nodes]
         probe = Probe(dofs, placed.N, placed.x, body.excess)
         self.set_march(len(self.solid.volume), steps, h, scheme, probe, between)
+        self.row = body.rho_c * float(self.solid.volume.mean()) / h
         cells = dict.fromkeys(("diffusivity", "source", "initial"), self.solid.parts)
         self.parts = cells | {"film": self.solid.sides}
         self.sizes = {"diffusivity": body.k / body.rho_c, "film": body.h, "source": body.f, "initial": body.T_0}
@@ -150,7 +151,7 @@ class Heat(FirstOrder):
 
     def matrix(self, p: Array, of_rate: float, of_state: float) -> SymmetricSparse:
         k, h, _ = self.coefficients(p)
-        return self.solid.matrix(of_state * k, of_state * h, of_rate * self.body.rho_c)
+        return self.solid.matrix(of_state * k.astype(p.dtype), of_state * h, of_rate * self.body.rho_c)
 
     def by_p(self, rate: Array, u: Array, p: Array) -> Any:
         from scipy.sparse import csr_array, hstack

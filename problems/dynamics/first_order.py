@@ -57,6 +57,7 @@ class FirstOrder(Transient):
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
     linear = constant = True
     c: float = 1.0
+    row: float = 1.0  # of what is read before a step, so that all of R has one unit
     h: float
     a: float
     n_field: int
@@ -85,7 +86,7 @@ class FirstOrder(Transient):
         raise NotImplementedError
 
     def matrix(self, p: Array, of_rate: float, of_state: float) -> Any:
-        """of_rate M + of_state R_u."""
+        """of_rate M + of_state R_u, of p's dtype."""
         raise NotImplementedError
 
     def by_p(self, rate: Array, u: Array, p: Array) -> Operator:
@@ -111,7 +112,7 @@ class FirstOrder(Transient):
         R = self.stored(rate, p, xp) + self.balance(mean, p, xp)
         if not self.held:
             return R
-        return xp.concatenate([R, u[self.n_field :] - self.probe.read(v[: self.n_field], xp)])
+        return xp.concatenate([R, self.row * (u[self.n_field :] - self.probe.read(v[: self.n_field], xp))])
 
     def matrices(self, p: Array) -> tuple[Any, Any]:
         """R_u and R_v of every step."""
@@ -122,10 +123,14 @@ class FirstOrder(Transient):
                 from scipy.sparse import block_array, csr_array
 
                 m = self.held
-                one = SymmetricPattern.of_elements(np.arange(m)[:, None], m).assemble(np.ones((m, 1)))
-                nothing = csr_array((m, m))
-                new = BlockDiagonal((new, one))
-                old = block_array([[old.full(), None], [-self.probe.matrix(self.n_field), nothing]], format="csr")
+                S, none = self.probe.matrix(self.n_field), csr_array((m, m))
+                rows = SymmetricPattern.of_elements(np.arange(m)[:, None], m).assemble(
+                    np.full((m, 1), self.row, p.dtype)
+                )
+                new, old = (
+                    BlockDiagonal((new, rows)),
+                    block_array([[old.full(), None], [-self.row * S, none]], format="csr"),
+                )
             self._kept = p.copy(), (new, old)
         return self._kept[1]
 
