@@ -113,6 +113,8 @@ class Heat(FirstOrder):
             if read.celsius:
                 check_celsius(self.name, given, ("ambient", "base", "initial"), data)
             h = float(read.t.max()) / steps if h is None else h
+            if h <= 0.0:
+                raise InputError(f"{data}: no datum is later than t = 0, where the march starts - state dt=, or units")
             check_within(data, read, steps * h)
             self.histories = Histories.at_times(read.sensor, read.t, read.T - body.T_inf, h, steps)
             placed, between, self.measured = read.placed, self.histories.between, True

@@ -218,7 +218,7 @@ class FirstOrder(Transient):
 
     @staticmethod
     def _place(x: Array) -> str:
-        return f"u at ({', '.join(f'{x_i:.3g}' for x_i in x)})"
+        return f"T at ({', '.join(f'{x_i:.3g}' for x_i in x)})"
 
     def candidates_at(self, x: Array) -> Candidates:
         """Every node in every step, the nodes at x (n_field, d)."""
