@@ -15,8 +15,8 @@ from gradient_routes.problems.data.observation import Candidates
 from gradient_routes.problems.data.placing import place
 from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
 from gradient_routes.problems.data.thermocouples import check_celsius
-from gradient_routes.problems.data.units import quantity, standard_deviation
-from gradient_routes.problems.dynamics.first_order import STEPS_MAX, FirstOrder, Probe, SchemeName
+from gradient_routes.problems.data.units import standard_deviation
+from gradient_routes.problems.dynamics.first_order import FirstOrder, Probe, SchemeName, check_march
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.heat.body import Body
 from gradient_routes.problems.heat.conducting import Conducting
@@ -92,17 +92,13 @@ class Heat(FirstOrder):
             ("parts=2 or more", parts > 1, True, {"alpha": alpha != 0.0}),
             ("phi=tv", phi == "tv", True, {"phi_width": phi_width != PHI_WIDTH}),
         )
-        if not 1 <= steps <= STEPS_MAX:
-            raise InputError(f"heat: steps={steps} - choose 1 <= steps <= {STEPS_MAX}")
         if sensors < 1 or seed < 0:
             raise InputError(f"heat: sensors={sensors},seed={seed} - choose at least one sensor, and a seed >= 0")
         self._given, self.seed = given, seed
         self.noise = standard_deviation(noise, data is not None, self.name, "temperature change")
         self.body = body = Body.of(given, names)
+        h = check_march(self.name, steps, dt, body.cells[0] * body.cells[1])
         self.solid = Conducting.of(body.cells, body.size, body.base is not None, body.exposed, parts)
-        h = None if dt is None else quantity(dt, "time", f"heat: dt={dt}")
-        if h is not None and not 0.0 < h:
-            raise InputError(f"heat: dt={dt} - choose dt > 0")
         if data is None:
             h = DT if h is None else h
             m = np.array([sensors, sensors if body.cells[1] > 1 else 1])

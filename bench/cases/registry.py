@@ -138,6 +138,7 @@ ORDER = (
     "coupon",
     "advection",
     "heat",
+    "advection-in-time",
     "vibrating-bar",
     "fd-one-sided",
     "fd-central",

@@ -10,6 +10,7 @@ import numpy as np
 
 from gradient_routes.problems.data.histories import Histories
 from gradient_routes.problems.data.observation import Candidates, Observation
+from gradient_routes.problems.data.units import quantity
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, SymmetricPattern
 from gradient_routes.problems.problem import Array, Linearization, Offers, Operator
@@ -18,6 +19,18 @@ from gradient_routes.problems.transient import Transient
 SchemeName = Literal["backward-euler", "crank-nicolson"]
 OF_NEW: dict[SchemeName, float] = {"backward-euler": 1.0, "crank-nicolson": 0.5}  # weight of u_t in the balance
 STEPS_MAX, STATE_MAX = 10**6, 10**8
+
+
+def check_march(who: str, steps: int, dt: float | str | None, cells: int) -> float | None:
+    """dt in s, None where it is not given. Raises InputError, also for a march of too many cells."""
+    if not 1 <= steps <= STEPS_MAX:
+        raise InputError(f"{who}: steps={steps} - choose 1 <= steps <= {STEPS_MAX}")
+    if steps * cells > STATE_MAX:
+        raise InputError(f"{who}: {steps} steps of {cells} cells - choose at most {STATE_MAX:g} in all")
+    h = None if dt is None else quantity(dt, "time", f"{who}: dt={dt}")
+    if h is not None and not 1e-30 <= h <= 1e30:
+        raise InputError(f"{who}: dt={dt} - choose dt > 0, from 1e-30 to 1e30 s")
+    return h
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +80,10 @@ class FirstOrder(Transient):
     seed: int = 0
 
     def set_march(self, n_field: int, steps: int, h: float, scheme: SchemeName, probe: Probe, between: bool) -> None:
-        """Raises InputError for a march that is too long."""
         self.n_field, self.steps, self.h, self.a, self.probe = n_field, steps, h, OF_NEW[scheme], probe
         self.held = len(probe.N) if between else 0
         self.n_state = steps * (n_field + self.held)
         self._kept: tuple[Array, tuple[Any, Any]] | None = None
-        if self.n_state > STATE_MAX:
-            raise InputError(f"{self.name}: {self.n_state} unknowns of all steps - choose at most {STATE_MAX:g}")
 
     # --- what a problem gives
 

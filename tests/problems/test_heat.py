@@ -225,7 +225,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "dt": ({"dt": 0.0}, "dt=0.0 - choose dt > 0"),
     "dt backwards": ({"dt": "-1min"}, "dt=-1min - choose dt > 0"),
     "dt in metres": ({"dt": "1mm"}, "'mm' is a unit of length, not of time"),
-    "too long": ({"n": 100, "steps": 10**5}, "unknowns of all steps - choose at most"),
+    "too long": ({"n": 100, "steps": 10**5}, "100000 steps of 10000 cells - choose at most"),
     "no cells": ({"n": 0}, "n=0"),
     "parts": ({"parts": 3}, "parts=3 with 8 x 8 cells"),
     "size": ({"size": "1,2,3"}, "size=1,2,3 - give one length or two"),
