@@ -170,9 +170,9 @@ class Advection(Problem):
         if self.alpha:
             by_theta = self.regularization.gradient(self.theta(p))
             J_p = by_theta if self.log or self.source_unknown else by_theta / p
-        return Linearization(self.R_p_of(by_cell, kappa), self.w * self._misfit(u), J_p)
+        return Linearization(self._R_p(by_cell, kappa), self.w * self._misfit(u), J_p)
 
-    def R_p_of(self, by_cell: Array, kappa: Array) -> Any:
+    def _R_p(self, by_cell: Array, kappa: Array) -> Any:
         """Columns dR_e/dp_e from dR_e/dkappa_e or dR_e/df_e, (n_e, 4)."""
         return self.supg.cells.columns(by_cell * kappa[:, None] if self.log else by_cell)
 
@@ -219,7 +219,7 @@ class Advection(Problem):
         kappa, _ = self.coefficients(p)
         A = self.supg.pattern.assemble(_transposed(self.supg, kappa))
         dR_df = np.broadcast_to(-self.supg.m, self.supg.cells.dofs.shape)
-        return A, self.R_p_of(dR_df if self.source_unknown else self.supg.cells.gather(u) @ self.supg.D, kappa)
+        return A, self._R_p(dR_df if self.source_unknown else self.supg.cells.gather(u) @ self.supg.D, kappa)
 
     def inconsistent_adjoint(self, u: Array, p: Array, other: Discretization) -> tuple[Any, Operator, Array] | None:
         """By the quadrature at corners, without streamline terms, or on a mesh of twice the mesh size (n even)."""
@@ -233,7 +233,7 @@ class Advection(Problem):
             R_p = self.linearize(u, p).R_p
             return supg.pattern.assemble(_transposed(supg, _coarsened(kappa, self.supg, supg))), I.T @ R_p, I.T @ J_u
         by_cell = supg.dR_df(kappa) if self.source_unknown else supg.dR_dkappa(u, kappa, f)
-        return supg.pattern.assemble(_transposed(supg, kappa)), self.R_p_of(by_cell, kappa), J_u
+        return supg.pattern.assemble(_transposed(supg, kappa)), self._R_p(by_cell, kappa), J_u
 
     @cached_property
     def _others(self) -> dict[str, Supg]:

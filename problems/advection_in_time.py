@@ -19,6 +19,7 @@ from gradient_routes.problems.data.observation import Candidates
 from gradient_routes.problems.data.regularization import PHI_WIDTH, Prior
 from gradient_routes.problems.dynamics.first_order import FirstOrder, Probe, SchemeName, check_march
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import GeneralSparse
 from gradient_routes.problems.problem import Array, Parameters, ParameterView
 
@@ -96,15 +97,18 @@ class AdvectionInTime(FirstOrder):
         mass = supg.M + supg.tau(kappa)[:, None, None] * supg.C.T
         return supg.pattern.assemble(of_state * supg.cell_matrices(kappa) + of_rate * mass)
 
-    def by_p(self, rate: Array, u: Array, p: Array) -> Any:
+    def by_p(self, rate: Array, u: Array, p: Array) -> ByProducts:
         kappa, f = self.coefficients(p)
-        supg = self.supg
+        supg, cells = self.supg, self.supg.cells
         if self.initial_unknown:
-            return supg.cells.columns(np.zeros(supg.cells.dofs.shape))
-        if self.steady.source_unknown:
-            return self.steady.R_p_of(supg.dR_df(kappa), kappa)
-        stored = supg.tau_kappa(kappa)[:, None] * (supg.cells.gather(rate) @ supg.C)
-        return self.steady.R_p_of(supg.dR_dkappa(u, kappa, f) + stored, kappa)
+            by_e = np.zeros(cells.dofs.shape)
+        elif self.steady.source_unknown:
+            by_e = supg.dR_df(kappa)
+        else:
+            stored = supg.tau_kappa(kappa)[:, None] * (cells.gather(rate) @ supg.C)
+            by_e = supg.dR_dkappa(u, kappa, f) + stored
+            by_e = by_e * kappa[:, None] if self.steady.log else by_e
+        return cells.products(by_e, np.arange(len(p)), len(p))
 
     def field_at_start(self, p: Any, xp: Any = np) -> Any:
         if not self.initial_unknown:

@@ -21,6 +21,7 @@ from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.heat.body import Body
 from gradient_routes.problems.heat.conducting import Conducting
 from gradient_routes.problems.heat.unknowns import Unknowns
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import SymmetricSparse
 from gradient_routes.problems.problem import Array, ParameterView
 
@@ -29,6 +30,7 @@ Unknown = Literal[
     "film+source", "film+initial", "source+initial",
 ]  # fmt: skip
 DT = 30.0  # [s]
+KEPT = 0.6  # of an oscillation in a step, from which on a note tells it
 
 
 class Heat(FirstOrder):
@@ -103,6 +105,7 @@ class Heat(FirstOrder):
             h = DT if h is None else h
             m = np.array([sensors, sensors if body.cells[1] > 1 else 1])
             x = np.stack(np.meshgrid(*((np.arange(k) + 0.5) / k for k in m), indexing="ij"), axis=-1).reshape(-1, 2)
+            sizes = body.sizes(given, names, None, None)
             placed, between = place(self.solid.mesh, x * body.size, self.name), False
         else:
             read = read_histories(data, self.solid.mesh, columns, units, self.noise)
@@ -114,19 +117,34 @@ class Heat(FirstOrder):
             check_within(data, read, steps * h)
             self.histories = Histories.at_times(read.sensor, read.t, read.T - body.T_inf, h, steps)
             placed, between, self.measured = read.placed, self.histories.between, True
-            self.noise, self.read_as = read.sigma, read.notes
-            self.notes = self.read_as
+            self.noise = read.sigma
+            sizes = body.sizes(given, names, read.t, read.T)
+            self.read_as = (*read.notes, f"start: {', '.join(f'{name}={sizes[name]:.4g}' for name in names)}")
         dofs = np.where(self.solid.free, np.cumsum(self.solid.free) - 1, -1)[placed.nodes]
         probe = Probe(dofs, placed.N, placed.x, body.excess)
         self.set_march(len(self.solid.volume), steps, h, scheme, probe, between)
         self.row = body.rho_c * float(self.solid.volume.mean()) / h
         cells = dict.fromkeys(("diffusivity", "source", "initial"), self.solid.parts)
         self.parts = cells | {"film": self.solid.sides}
-        self.sizes = {"diffusivity": body.k / body.rho_c, "film": body.h, "source": body.f, "initial": body.T_0}
+        self.sizes = sizes
         self.unknowns = Unknowns.of(names, self.sizes, self.parts, parametrization == "log")
         self.parameters = self.unknowns.parameters(np.array(body.size))
         self.regularization = Prior(alpha, phi, phi_width, self.unknowns.neighbours)
         self.regularization.check(self.name)
+        self.notes = (*self._doubts(), *self.read_as)
+
+    def _doubts(self) -> list[str]:
+        """That the trapezoidal rule keeps the shortest waves of a sudden start, with alternating sign."""
+        dx = np.array(self.body.size) / self.body.cells
+        z = 2.0 * self.sizes["diffusivity"] * self.h * (dx[: 1 + (self.body.cells[1] > 1)] ** -2.0).sum()
+        kept = abs((1.0 - z) / (1.0 + z))
+        sudden = self.body.base not in (None, self.body.T_0)
+        if self.a == 1.0 or not sudden or z < 1.0 or kept < KEPT:
+            return []
+        return [
+            f"crank-nicolson: the shortest waves of the sudden start alternate and keep {kept:.0%} in a step -"
+            f" dt={self.h / z:.2g} damps them at once, as backward-euler does"
+        ]
 
     # --- the equations
 
@@ -151,15 +169,22 @@ class Heat(FirstOrder):
         k, h, _ = self.coefficients(p)
         return self.solid.matrix(of_state * k.astype(p.dtype), of_state * h, of_rate * self.body.rho_c)
 
-    def by_p(self, rate: Array, u: Array, p: Array) -> Any:
-        from scipy.sparse import csr_array, hstack
+    def by_p(self, rate: Array, u: Array, p: Array) -> ByProducts:
+        each = [c for c in self.unknowns.each if c.name != "initial"]
+        by = [self.solid.by(c.name, u, self.body.excess) for c in each]
+        slopes = [c.slope(p) * (self.body.rho_c if c.name == "diffusivity" else 1.0) for c in each]
 
-        columns = []
-        for c in self.unknowns.each:
-            factor = c.slope(p) * (self.body.rho_c if c.name == "diffusivity" else 1.0)
-            nothing = csr_array((self.n_field, len(c.parts.x)))
-            columns.append(nothing if c.name == "initial" else self.solid.by(c.name, u, self.body.excess) * factor)
-        return hstack(columns, format="csr")
+        def forward(dp: Array) -> Array:
+            terms = (A @ (slope * dp[c.at]) for c, A, slope in zip(each, by, slopes, strict=True))
+            return sum(terms, np.zeros(self.n_field))
+
+        def reverse(lam: Array) -> Array:
+            g = np.zeros_like(p)
+            for c, A, slope in zip(each, by, slopes, strict=True):
+                g[c.at] = slope * (A.T @ lam)
+            return g
+
+        return ByProducts(forward, reverse)
 
     def field_at_start(self, p: Any, xp: Any = np) -> Any:
         T_0 = self._values(p, xp)["initial"] - self.body.T_inf
@@ -171,9 +196,9 @@ class Heat(FirstOrder):
 
         if all(c.name != "initial" for c in self.unknowns.each):
             return None
-        nothing = [csr_array((self.n_field, len(c.parts.x))) for c in self.unknowns.each]
+        n = self.n_field
         columns = [
-            self.solid.start if c.name == "initial" else no for c, no in zip(self.unknowns.each, nothing, strict=True)
+            self.solid.start if c.name == "initial" else csr_array((n, len(c.parts.x))) for c in self.unknowns.each
         ]
         return self.below(hstack(columns, format="csr"))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -12,8 +13,9 @@ from gradient_routes.problems.data.histories import Histories
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.units import quantity
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import BlockDiagonal, SymmetricPattern
-from gradient_routes.problems.problem import Array, Linearization, Offers, Operator
+from gradient_routes.problems.problem import Array, Linearization, Offers
 from gradient_routes.problems.transient import Transient
 
 SchemeName = Literal["backward-euler", "crank-nicolson"]
@@ -99,7 +101,7 @@ class FirstOrder(Transient):
         """of_rate M + of_state R_u, of p's dtype."""
         raise NotImplementedError
 
-    def by_p(self, rate: Array, u: Array, p: Array) -> Operator:
+    def by_p(self, rate: Array, u: Array, p: Array) -> ByProducts:
         """The derivative of both terms by p, (n_field, n_p)."""
         raise NotImplementedError
 
@@ -133,7 +135,7 @@ class FirstOrder(Transient):
                 from scipy.sparse import block_array, csr_array
 
                 m = self.held
-                S, none = self.probe.matrix(self.n_field), csr_array((m, m))
+                S, none = self._S, csr_array((m, m))
                 rows = SymmetricPattern.of_elements(np.arange(m)[:, None], m).assemble(
                     np.full((m, 1), self.row, p.dtype)
                 )
@@ -159,17 +161,25 @@ class FirstOrder(Transient):
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
         before, now = self.data.pulls(t, self._missed(t, u), len(self.probe.N))
-        by_u = [self.probe.matrix(self.n_field).T @ now, before[: self.held]]
-        R_p = self.by_p(*self._means(u, v), p)
-        return Linearization(self.below(R_p), self.c * np.concatenate(by_u), np.zeros_like(p))
+        J_u = self.c * np.concatenate([self._S.T @ now, before[: self.held]])
+        R_p, n = self.by_p(*self._means(u, v), p), self.n_field
+        if self.held:
+            none, above = np.zeros(self.held), R_p
+            R_p = ByProducts(lambda dp: np.concatenate([above @ dp, none]), lambda lam: above.T @ lam[:n])
+        return Linearization(R_p, J_u, np.zeros_like(p))
 
     def below(self, A: Any) -> Any:
-        """A (n_field, n_p), with rows of zeros for what is read before a step."""
+        """A (n_field, n_p), sparse, with rows of zeros for what is read before a step."""
         from scipy.sparse import csr_array, vstack
 
         return vstack([A, csr_array((self.held, A.shape[1]))], format="csr") if self.held else A
 
     # --- data
+
+    @cached_property
+    def _S(self) -> Any:
+        """Of what sensors read, (m, n_field)."""
+        return self.probe.matrix(self.n_field)
 
     @property
     def data(self) -> Histories:
@@ -202,7 +212,7 @@ class FirstOrder(Transient):
 
         data, root, n, m = self.data, self.c**0.5, self.n_field, len(self.probe.N)
         k = np.arange(len(data.d))
-        S = self.probe.matrix(n)[data.sensor].tocoo()
+        S = self._S[data.sensor].tocoo()
         rows, columns, values = [S.row], [S.col], [data.w[S.row] * S.data]
         if self.held:
             rows, columns = [*rows, k], [*columns, n + data.sensor]

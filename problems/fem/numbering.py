@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.problem import Array
 
 
@@ -42,6 +43,14 @@ class Numbering:
         at = e if column is None else column[e]
         shape = len(self.entries), len(self.dofs) if count is None else count
         return csr_array((by_e[e, a], (self.dofs[e, a], at)), shape=shape)
+
+    def products(self, by_e: Array, column: Array, count: int) -> ByProducts:
+        """The same matrix, not assembled: real."""
+
+        def reverse(w: Array) -> Array:
+            return np.bincount(column, (self.gather(w) * by_e).sum(axis=1), minlength=count)
+
+        return ByProducts(lambda v: self.scatter(by_e * v[column][:, None]), reverse)
 
 
 def _inverse(dofs: Array, n: int) -> Array:

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from gradient_routes.problems.data.units import Kind, quantity
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.heat.conducting import AROUND
+from gradient_routes.problems.problem import Array
 
 DEFAULTS: Mapping[str, Any] = {
     "size": 0.1,
@@ -45,6 +48,27 @@ class Body:
     def excess(self) -> float:
         """T - T_inf at x = 0 [K], 0 where it is not given."""
         return 0.0 if self.base is None else self.base - self.T_inf
+
+    def sizes(self, given: Mapping[str, Any], names: list[str], t: Array | None, T: Array | None) -> dict[str, float]:
+        """a [m2/s], h, f and T_0, known or of the start.
+
+        What is unknown and has no start of its own starts from data T (q,) at times t (q,): heat crosses the body until
+        the last of them, h L/k = 1, f warms the body by as much as was measured, and T_0 is the first datum.
+        """
+        found = {"diffusivity": self.k / self.rho_c, "film": self.h, "source": self.f, "initial": self.T_0}
+        if t is None or T is None:
+            return found
+        started = [name for name in names if given["conductivity" if name == "diffusivity" else name] is None]
+        end = float(t.max())
+        if "diffusivity" in started:
+            found["diffusivity"] = self.size[0] ** 2 / end
+        if "film" in started:
+            found["film"] = found["diffusivity"] * self.rho_c / self.size[0]
+        if "source" in started:
+            found["source"] = self.rho_c * max(float(np.ptp(T)), 1.0) / end
+        if "initial" in started:
+            found["initial"] = float(T[t.argmin()])
+        return found
 
     @classmethod
     def of(cls, given: Mapping[str, Any], names: list[str]) -> Body:

@@ -15,6 +15,7 @@ from gradient_routes.problems.fem.mesh import Mesh
 from gradient_routes.problems.fem.numbering import Numbering
 from gradient_routes.problems.fem.plane_meshes import rectangle_mesh
 from gradient_routes.problems.heat.unknowns import Parts
+from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
 from gradient_routes.problems.problem import Array
 
@@ -97,15 +98,15 @@ class Conducting:
         weights = k[:, None] * self.D[i, j], (h * self.l)[:, None] * edge, (stored * self.volume)[:, None] * single
         return self.pattern.assemble(np.concatenate(weights))
 
-    def by(self, name: str, u: Array, given: float) -> Any:
-        """Derivatives of `balance` by k, f or h of the parts, sparse (n, parts)."""
+    def by(self, name: str, u: Array, given: float) -> ByProducts:
+        """Derivatives of `balance` by k, f or h of the parts, (n, parts)."""
         if name == "film":
             by_e = self.l[:, None] * (self.edges.gather(u, given=given) @ EDGE)
-            return self.edges.columns(by_e, self.edge_part, len(self.sides.x))
+            return self.edges.products(by_e, self.edge_part, len(self.sides.x))
         by_e = self.cells.gather(u, given=given) @ self.D
         if name == "source":
             by_e = np.broadcast_to(-self.m, by_e.shape)
-        return self.cells.columns(by_e, self.cell_part, len(self.parts.x))
+        return self.cells.products(by_e, self.cell_part, len(self.parts.x))
 
 
 def _around(x: Array) -> Array:
