@@ -36,6 +36,17 @@ KAPPA_MAX = 1e12  # kappa is at least its inverse: (kappa / h^2)^3 stays in floa
 THETA_MAX = 100.0  # bound of |log kappa|
 CENTRE = np.array([0.5, 0.5])
 
+Cells = Annotated[int, "cells along every edge"]
+Angle = Annotated[float, "between the flow and the x axis [degrees]"]
+Kappa = Annotated[float, "mean diffusivity; 1 / (2 n kappa) is the mesh Peclet number [m2/s]"]
+Parametrization = Annotated[Literal["log", "raw"] | None, "of kappa: p = log kappa or p = kappa [log]"]
+SensorsOf = Annotated[Literal["outflow", "everywhere"], "nodes measured"]
+Noise = Annotated[float, "standard deviation added to a twin's data [K]"]
+Seed = Annotated[int, "of that noise"]
+Alpha = Annotated[float, "weight of Phi"]
+PhiOf = Annotated[FieldPhi, "of theta = log kappa or f: 1/2 |D theta|^2 or total variation"]
+PhiWidth = Annotated[float, "jump of theta below which total variation is rounded"]
+
 
 def plume(x: Array, b: Array) -> Array:
     """The source f(x) = 4 exp(-|x - x_0|^2 / (2 0.15^2)) [K/s], x_0 0.2 m upstream of the middle, at x (..., 2)."""
@@ -71,18 +82,18 @@ class Advection(Problem):
     def __init__(
         self,
         *,
-        n: Annotated[int, "cells along every edge"] = 8,
-        angle: Annotated[float, "between the flow and the x axis [degrees]"] = 30.0,
-        kappa: Annotated[float, "mean diffusivity; 1 / (2 n kappa) is the mesh Peclet number [m2/s]"] = 0.05,
+        n: Cells = 8,
+        angle: Angle = 30.0,
+        kappa: Kappa = 0.05,
         unknown: Annotated[Literal["diffusivity", "source"], "what p is, cell by cell"] = "diffusivity",
-        parametrization: Annotated[Literal["log", "raw"] | None, "of kappa: p = log kappa or p = kappa [log]"] = None,
-        sensors: Annotated[Literal["outflow", "everywhere"], "nodes measured"] = "outflow",
+        parametrization: Parametrization = None,
+        sensors: SensorsOf = "outflow",
         data: Annotated[Literal["target", "twin"], "0.5 K; twin: of an inclusion, or of the plume"] = "target",
-        noise: Annotated[float, "standard deviation added to a twin's data [K]"] = 0.0,
-        seed: Annotated[int, "of that noise"] = 0,
-        alpha: Annotated[float, "weight of Phi"] = 0.0,
-        phi: Annotated[FieldPhi, "of theta = log kappa or f: 1/2 |D theta|^2 or total variation"] = "tikhonov",
-        phi_width: Annotated[float, "jump of theta below which total variation is rounded"] = PHI_WIDTH,
+        noise: Noise = 0.0,
+        seed: Seed = 0,
+        alpha: Alpha = 0.0,
+        phi: PhiOf = "tikhonov",
+        phi_width: PhiWidth = PHI_WIDTH,
     ) -> None:
         _check(n, angle, kappa, unknown, parametrization, data, noise, seed)
         check_applies("advection", ("phi=tv", phi == "tv", True, {"phi_width": phi_width != PHI_WIDTH}))
@@ -147,9 +158,9 @@ class Advection(Problem):
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = w/2 |u - d|^2 + alpha Phi [K2 m; K2 m2 for sensors=everywhere]."""
         J = 0.5 * self.w * xp.sum((u[self.sensor_nodes] - self._data()) ** 2)
-        return J + self.regularization.value(xp, self._theta(p, xp)) if self.alpha else J
+        return J + self.regularization.value(xp, self.theta(p, xp)) if self.alpha else J
 
-    def _theta(self, p: Any, xp: Any = np) -> Any:
+    def theta(self, p: Any, xp: Any = np) -> Any:
         return p if self.log or self.source_unknown else xp.log(p)
 
     def linearize(self, u: Array, p: Array) -> Linearization:
@@ -157,13 +168,13 @@ class Advection(Problem):
         by_cell = self.supg.dR_df(kappa) if self.source_unknown else self.supg.dR_dkappa(u, kappa, f)
         J_p = np.zeros_like(p)
         if self.alpha:
-            by_theta = self.regularization.gradient(self._theta(p))
+            by_theta = self.regularization.gradient(self.theta(p))
             J_p = by_theta if self.log or self.source_unknown else by_theta / p
         return Linearization(self._R_p(by_cell, kappa), self.w * self._misfit(u), J_p)
 
     def _R_p(self, by_cell: Array, kappa: Array) -> Any:
         """Columns dR_e/dp_e from dR_e/dkappa_e or dR_e/df_e, (n_e, 4)."""
-        return self.supg.cellwise_columns(by_cell * kappa[:, None] if self.log else by_cell)
+        return self.supg.cells.columns(by_cell * kappa[:, None] if self.log else by_cell)
 
     def _misfit(self, u: Array) -> Array:
         """u - d at the sensor nodes, 0 elsewhere, (n_u,)."""
@@ -182,7 +193,7 @@ class Advection(Problem):
         return Candidates(np.arange(len(x)), lambda j: f"u at ({x[j, 0]:.3g}, {x[j, 1]:.3g})", x)
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
-        return self.regularization, self._theta(p), np.ones_like(p) if self.log or self.source_unknown else 1.0 / p
+        return self.regularization, self.theta(p), np.ones_like(p) if self.log or self.source_unknown else 1.0 / p
 
     def traced(self) -> Traced:
         from gradient_routes.problems.jax64 import jnp
@@ -195,7 +206,7 @@ class Advection(Problem):
         """1/2 int (u - d)^2 + alpha Phi with the consistent mass matrix; u - d = 0 at the inflow, as in J."""
         misfit = self._misfit(u)
         by_u = self.supg.mass(self.on_outflow) @ misfit
-        return float(0.5 * misfit @ by_u + self.regularization.value(np, self._theta(p))), by_u
+        return float(0.5 * misfit @ by_u + self.regularization.value(np, self.theta(p))), by_u
 
     def continuous_adjoint(self, u: Array, p: Array) -> tuple[Any, Operator]:
         """-b . grad lam - div(kappa grad lam) = -J_u, kappa dlam/dn + b . n lam = 0 at the outflow, 0 at the inflow.
@@ -207,8 +218,8 @@ class Advection(Problem):
         """
         kappa, _ = self.coefficients(p)
         A = self.supg.pattern.assemble(_transposed(self.supg, kappa))
-        dR_df = np.broadcast_to(-self.supg.m, self.supg.dofs.shape)
-        return A, self._R_p(dR_df if self.source_unknown else self.supg.at_corners(u) @ self.supg.D, kappa)
+        dR_df = np.broadcast_to(-self.supg.m, self.supg.cells.dofs.shape)
+        return A, self._R_p(dR_df if self.source_unknown else self.supg.cells.gather(u) @ self.supg.D, kappa)
 
     def inconsistent_adjoint(self, u: Array, p: Array, other: Discretization) -> tuple[Any, Operator, Array] | None:
         """By the quadrature at corners, without streamline terms, or on a mesh of twice the mesh size (n even)."""

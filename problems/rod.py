@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import copy
 import math
-import re
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import PHI_WIDTH, FieldPhi, Prior
-from gradient_routes.problems.data.thermocouples import Line, read_thermocouples
+from gradient_routes.problems.data.thermocouples import Line, check_celsius, read_thermocouples
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, check_applies
 from gradient_routes.problems.heat.fin import Fin, check_given, value
-from gradient_routes.problems.heat.unknowns import Unknowns
+from gradient_routes.problems.heat.unknowns import Parts, Unknowns
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
 from gradient_routes.problems.problem import (
     Array,
@@ -116,7 +115,8 @@ class Rod(Problem):
             self.fin.check_reach(self.sizes, float(x.min()))
         self.sensors = Line.through(x, self.fin.L, n)
         self.part = np.arange(n) * parts // n  # (N,) of every element
-        self.unknowns = Unknowns.of(names, self.sizes, parts, parametrization == "log")
+        each = {"film": Parts.line(parts), "conductivity": Parts.line(parts), "flux": Parts.point()}
+        self.unknowns = Unknowns.of(names, self.sizes, each, parametrization == "log")
         self.parameters = self.unknowns.parameters(self.fin.L)
         self.regularization = Prior(alpha, phi, phi_width, self.unknowns.neighbours)
         self.regularization.check("rod")
@@ -231,10 +231,8 @@ class Rod(Problem):
         """Sets the data, their noise and notes from a file; x (m,) of its thermocouples."""
         given = self._given
         read = read_thermocouples(path, self.fin.L, given["columns"], given["units"], self.noise)
-        for name in ("ambient", "base", "tip"):
-            value = str(given[name])
-            if read.celsius and re.fullmatch(r"[-+.\de]+", value):
-                raise InputError(f"rod: {name}={value} has no unit, T of {path} is in degC - write {value}degC")
+        if read.celsius:
+            check_celsius("rod", given, ("ambient", "base", "tip"), path)
         self.measured = True
         self.d, self.noise, self.read_as = read.T - self.fin.T_inf, read.sigma, read.notes
         return read.x

@@ -10,7 +10,7 @@ import numpy as np
 from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.recurrence import Recurrence
-from gradient_routes.problems.problem import Array, Linearization, Operator, Problem, Traced
+from gradient_routes.problems.problem import Array, Linearization, Operator, ParameterView, Problem, Traced
 from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
 
@@ -164,6 +164,23 @@ class Transient(Problem):
             return y
 
         return ByProducts(forward, lambda lam: R_p.T @ lam + self.pulled_to_initial(R_v.T @ lam[:n], p))
+
+    def initial_share(self, p: Array, u: Array, lam: Array) -> Array | None:
+        """What dJ/dp owes to the initial state, mu_0 . du_0/dp with mu_0 = R_v^T lam_1 (n_p,); None where u_0 does not
+        depend on p. The rest is that of the rates.
+        """
+        by, n = self.initial_by(p), self.n_step
+        if by is None:
+            return None
+        return np.asarray(by.T @ (self.step_coupling(1, u[:n], self.initial_state(p), p).T @ lam[:n]))
+
+    def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
+        """The shares of the initial state and of the rates, where u_0 depends on p and lam is known."""
+        initial = None if lam is None else self.initial_share(p, u, lam)
+        if lam is None or initial is None:
+            return ParameterView()
+        lin = self.linearize(u, p)
+        return ParameterView({"by u_0": initial, "by rates": lin.J_p + lin.R_p.T @ lam - initial})
 
     def traced(self) -> Traced:
         """R and J of all steps by one trace of a step."""

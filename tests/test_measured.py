@@ -15,13 +15,15 @@ MEASURED = ROOT / "examples" / "measured"
 RUBBER = f"data={MEASURED}/rubber.csv,noise=5kPa"
 GIVEN = "length=400mm,diameter=12mm,conductivity=110,base=85degC,ambient=21.5degC,noise=0.1K"
 ROD = f"data={MEASURED}/cooled_rod.csv,{GIVEN}"
+WALL = f"data={MEASURED}/heated_wall.csv,n=10,ny=1,size=100mm,exposed=right,density=2300,heat_capacity=880,noise=0.2K"
+WALL += ",ambient=20degC,base=60degC,initial=20degC,unknown=diffusivity+film"
 
 
 def made(name: str) -> dict[str, Any]:
     return runpy.run_path(str(MEASURED / f"make_{name}.py"))
 
 
-@pytest.mark.parametrize("name", ["rubber", "cooled_rod"])
+@pytest.mark.parametrize("name", ["rubber", "cooled_rod", "heated_wall"])
 def test_files_are_what_their_programs_make(name: str) -> None:
     text = (MEASURED / f"{name}.csv").read_text(encoding="utf-8")
     assert text.splitlines() == made(name)["rows"]()
@@ -48,3 +50,13 @@ def test_a_wrong_model_is_flagged_and_the_right_one_finds_the_truth(
     rows = list(csv.DictReader(path.read_text().splitlines()))
     off = [(float(row["estimate"]) - p) / float(row["sd"]) for row, p in zip(rows, truth, strict=True)]
     assert np.abs(off).max() < 3.5
+
+
+def test_histories_of_a_wall_find_its_diffusivity_and_film_coefficient(tmp_path: Path, cli) -> None:
+    path, options = tmp_path / "p.csv", ["--optimizer", "gauss-newton", "--no-plot", "--no-store"]
+    wall = f"heat[{WALL},steps=61,dt=5min,scheme=crank-nicolson]"
+    ended = cli("invert", "--problem", wall, *options, "-o", str(path))
+    assert (ended.code, "correlated in" in ended.out) == (0, False)
+    truth = made("heated_wall")
+    for row, value in zip(csv.DictReader(path.read_text().splitlines()), (truth["a"], truth["h"]), strict=True):
+        assert abs(float(row["estimate"]) - np.log(value)) < 3.5 * float(row["sd"])

@@ -137,6 +137,8 @@ ORDER = (
     "rod",
     "coupon",
     "advection",
+    "heat",
+    "advection-in-time",
     "vibrating-bar",
     "fd-one-sided",
     "fd-central",

@@ -32,6 +32,10 @@ COLUMNS = (
     Column("partial", "TEXT", "", "which part of dJ/dp was computed; NULL where the whole"),
     Column("objective", "REAL", "problem's", "J(p)"),
     Column("gradient", "TEXT", "problem's", "dJ/dp or the part computed, where <= 64 or asked for", json=True),
+    Column(
+        "gradient_initial", "TEXT", "problem's", "its share by the initial state, where that depends on p", json=True
+    ),
+    Column("gradient_rates", "TEXT", "problem's", "and the rest, by the rates of a march", json=True),
     Column("gradient_norm", "REAL", "problem's", "|dJ/dp|_2, or of the part computed"),
     Column("gradient_error", "REAL", "1", "|g - g_ref|_2 / |g_ref|_2, where judged in directions V: of V^T g"),
     Column("reference", "TEXT", "", "where g_ref comes from"),

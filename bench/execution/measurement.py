@@ -25,6 +25,7 @@ from gradient_routes.bench.execution.isolation.channel import Channel
 from gradient_routes.bench.execution.isolation.messages import Begun, Done, Known, Ready, Turn, Turned
 from gradient_routes.bench.execution.memory import peak_of
 from gradient_routes.bench.execution.references import Judge, KnownJudges, norm2
+from gradient_routes.bench.execution.shares import shares
 from gradient_routes.bench.execution.solved import adjoint, other_functional, rounding, unsolved
 from gradient_routes.bench.execution.timing import Rounds, seconds_of
 from gradient_routes.bench.units import duration
@@ -276,9 +277,10 @@ def _checked(context: CaseContext, route: Route, result: Result, record: Record)
     J = context.objective() if result.J is None else result.J
     if not np.isfinite(J):
         raise NonFinite(f"{route.name}: J = {J} - check p and the data")
-    return {
+    kept = g.size <= KEEP_GRADIENT or context.settings.gradient
+    return (shares(context.problem, context.p, result) if kept else {}) | {
         "objective": float(J),
-        "gradient": g.tolist() if g.size <= KEEP_GRADIENT or context.settings.gradient else None,
+        "gradient": g.tolist() if kept else None,
         "gradient_norm": norm2(g),
         "residual": None if result.residual is None else float(result.residual),
         "tape_bytes": None if result.tape is None else int(result.tape),

@@ -17,7 +17,7 @@ Command = Callable[..., Any]
 COLUMNS = "Columns of the problem's data file, as x=NAME,ux=NAME; y=3mm is one value for all rows. [by its header]"
 UNITS = (
     "Units of these columns that the header does not state: mm, or x=mm,ux=um. m, mm, um; Pa, kPa, MPa, GPa, N/mm2;"
-    " N, kN; 1, %, microstrain; K, degC; px with its scale, px=0.02mm."
+    " N, kN; 1, %, microstrain; s, ms, min, h; K, degC; px with its scale, px=0.02mm."
 )
 NAMES = ("selector", "problem", "problems")  # under which a command knows its --problem
 

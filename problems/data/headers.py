@@ -11,6 +11,7 @@ from gradient_routes.problems.errors import InputError
 
 # rows that such a column tells apart belong to several J: fitted as one they give a wrong answer
 CASES = ("load", "loadcase", "case", "frame", "step", "time")
+IN_FULL = {"t": "time", "T": "temperature"}  # names that differ by case alone
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def match(file: NumberFile, names: Sequence[str], given: Mapping[str, str]) -> t
                     f"{file.path}: no column {given[name]}; it has {file.listed} - correct columns={name}:"
                 )
         else:
-            places = [k for k, (header, _) in enumerate(split) if k not in taken and plain(header) == plain(name)]
+            places = [k for k, (header, _) in enumerate(split) if k not in taken and means(header, name, names)]
         if len(places) > 1:
             where = ", ".join(f"column {k + 1} is {file.names[k]}" for k in places)
             raise InputError(
@@ -58,6 +59,13 @@ def match(file: NumberFile, names: Sequence[str], given: Mapping[str, str]) -> t
             f" the rows of one {telling[0]} and remove the column{cases}"
         )
     return found, others
+
+
+def means(header: str, name: str, names: Sequence[str]) -> bool:
+    """Whether a header without its unit stands for `name` among `names`."""
+    if plain(header) == IN_FULL.get(name):
+        return True
+    return header == name or (header not in names and plain(header) == plain(name))
 
 
 def plain(name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,6 +61,14 @@ class Readings:
     sigma: float
     notes: tuple[str, ...]
     celsius: bool
+
+
+def check_celsius(who: str, given: Mapping[str, Any], names: Sequence[str], path: str) -> None:
+    """Raises InputError for temperatures without a unit beside a file in degrees Celsius."""
+    for name in names:
+        value = str(given[name])
+        if re.fullmatch(r"[-+.\de]+", value):
+            raise InputError(f"{who}: {name}={value} has no unit, T of {path} is in degC - write {value}degC")
 
 
 def read_thermocouples(

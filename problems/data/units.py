@@ -10,12 +10,13 @@ from typing import Literal
 
 from gradient_routes.problems.errors import InputError
 
-Kind = Literal["length", "stress", "force", "ratio", "temperature", "temperature change", "number", "word"]
+Kind = Literal["length", "stress", "force", "ratio", "time", "temperature", "temperature change", "number", "word"]
 UNITS: Mapping[Kind, Mapping[str, float]] = {
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "stress": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6},
     "force": {"N": 1.0, "kN": 1e3},
     "ratio": {"1": 1.0, "%": 1e-2, "microstrain": 1e-6},
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0},
     "temperature": {"K": 1.0, "degC": 1.0},
     "temperature change": {"K": 1.0, "degC": 1.0},
     "number": {},

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from gradient_routes.problems.fem.numbering import Numbering
 from gradient_routes.problems.matrices.sparse import GeneralPattern, GeneralSparse
 from gradient_routes.problems.problem import Array
 
@@ -27,10 +28,9 @@ class Supg:
     mesh, free (n_u,)  scikit-fem's mesh, and its nodes that carry degrees of freedom
     b (2,)             the flow, |b| = 1 m/s
     h                  length of a cell along b [m]
-    D, C, S (4, 4)     of (grad v, grad u), (v, b . grad u), (b . grad v, b . grad u)
+    D, C, S, M (4, 4)  of (grad v, grad u), (v, b . grad u), (b . grad v, b . grad u), (v, u)
     m, s (4,)          of (v, 1), (b . grad v, 1)
-    dofs (n_e, 4)      degrees of freedom at the cells' corners, -1 at the inflow
-    entries (n_u, 4)   flat indices of each degree of freedom in dofs; -1 if fewer than 4 cells meet
+    cells              degrees of freedom at their corners, -1 at the inflow
     """
 
     mesh: Any
@@ -40,10 +40,10 @@ class Supg:
     D: Array
     C: Array
     S: Array
+    M: Array
     m: Array
     s: Array
-    dofs: Array
-    entries: Array
+    cells: Numbering
     pattern: GeneralPattern
 
     @classmethod
@@ -63,24 +63,23 @@ class Supg:
             lambda u, v, _: dot(grad(v), grad(u)),
             lambda u, v, _: v * along(u),
             lambda u, v, _: along(v) * along(u),
+            lambda u, v, _: v * u,
         )
         linear = (lambda v, _: 1.0 * v, lambda v, _: along(v))
-        D, C, S = (
+        D, C, S, M = (
             BilinearForm(form).elemental(cell).tolocal()[0].T for form in bilinear
         )  # scikit-fem stores columns first
         m, s = (LinearForm(form).elemental(cell).tolocal()[0] for form in linear)
         free = ~on_inflow(mesh.p.T, b)
-        dofs = np.where(free, np.cumsum(free) - 1, -1)[mesh.t.T]
-        n_u = int(free.sum())
+        cells = Numbering.of(mesh.t.T, free)
         return cls(
             mesh=mesh,
             free=np.flatnonzero(free),
             b=b,
             h=1.0 / (n * float(np.abs(b).max())),
-            D=D, C=C, S=S, m=m, s=s,
-            dofs=dofs,
-            entries=_entries(dofs, n_u),
-            pattern=GeneralPattern.of_elements(dofs, n_u),
+            D=D, C=C, S=S, M=M, m=m, s=s,
+            cells=cells,
+            pattern=GeneralPattern.of_elements(cells.dofs, int(free.sum())),
         )  # fmt: skip
 
     @property
@@ -102,16 +101,12 @@ class Supg:
         """dtau/dkappa."""
         return -144.0 * kappa / self.h**4 * self.tau(kappa) ** 3
 
-    def at_corners(self, u: Any, xp: Any = np) -> Any:
-        """u (n_u,) at the corners of every cell, (n_e, 4)."""
-        return xp.append(u, 0.0)[self.dofs]
-
     def residual(self, u: Any, kappa: Any, f: Any, xp: Any = np) -> Any:
         """R (n_u,), for kappa (n_e,) [m^2/s] and f (n_e,) [K/s] constant in every cell."""
-        U, kappa, f = self.at_corners(u, xp), kappa[:, None], f[:, None]
+        U, kappa, f = self.cells.gather(u, xp), kappa[:, None], f[:, None]
         tau = self.tau(kappa)
         R_e = kappa * (U @ self.D.T) + U @ self.C.T + tau * (U @ self.S.T) - f * (self.m + tau * self.s)
-        return xp.append(R_e, 0.0)[self.entries].sum(axis=1)
+        return self.cells.scatter(R_e, xp)
 
     def cell_matrices(self, kappa: Any) -> Any:
         """kappa D + C + tau S, (n_e, 4, 4)."""
@@ -123,20 +118,12 @@ class Supg:
 
     def dR_dkappa(self, u: Array, kappa: Array, f: Array) -> Array:
         """dR_e/dkappa_e (n_e, 4), including dtau/dkappa."""
-        U = self.at_corners(u)
+        U = self.cells.gather(u)
         return np.asarray(U @ self.D.T + self.tau_kappa(kappa)[:, None] * (U @ self.S.T - f[:, None] * self.s))
 
     def dR_df(self, kappa: Array) -> Array:
         """dR_e/df_e (n_e, 4)."""
         return np.asarray(-self.m - self.tau(kappa)[:, None] * self.s)
-
-    def cellwise_columns(self, by_cell: Array) -> Any:
-        """The sparse (n_u, n_e) matrix with by_cell[e] (4,) in column e, in the rows dofs[e]."""
-        from scipy.sparse import csr_array
-
-        e, a = np.nonzero(self.dofs >= 0)
-        shape = self.pattern.n, len(self.dofs)
-        return csr_array((by_cell[e, a], (self.dofs[e, a], e)), shape=shape)
 
     def mass(self, of_outflow: bool) -> Any:
         """The consistent mass matrix (n_u, n_u) of the square or of the outflow boundary."""
@@ -175,15 +162,3 @@ def on_inflow(x: Array, b: Array) -> Array:
 def unit_vector(angle: float) -> Array:
     """The unit vector at an angle [degrees] to the x axis."""
     return np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
-
-
-def _entries(dofs: Array, n_u: int) -> Array:
-    """The inverse of `dofs`: at most four cells meet in a node."""
-    flat = dofs.ravel()
-    order = np.argsort(flat, kind="stable")
-    order = order[flat[order] >= 0]
-    node = flat[order]
-    first = np.searchsorted(node, np.arange(n_u))
-    entries = np.full((n_u, 4), -1)
-    entries[node, np.arange(len(node)) - first[node]] = order
-    return entries

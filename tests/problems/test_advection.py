@@ -75,7 +75,7 @@ def test_supg_does_not_oscillate_where_galerkin_does() -> None:
     x, inside = supg.x[:, 0], supg.x[:, 0] < 1.0
     stabilized = supg.tangent(kappa), -supg.residual(np.zeros(len(x)), kappa, f)
     galerkin = supg.pattern.assemble(np.broadcast_to(k * supg.D + supg.C, (n * n, 4, 4)))
-    plain = galerkin, supg.cellwise_columns(np.broadcast_to(supg.m, (n * n, 4))) @ f
+    plain = galerkin, supg.cells.columns(np.broadcast_to(supg.m, (n * n, 4))) @ f
     missed = []
     for A, load in (stabilized, plain):
         u = np.linalg.solve(A.full().toarray()[np.ix_(inside, inside)], load[inside])

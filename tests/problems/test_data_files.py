@@ -16,7 +16,7 @@ from gradient_routes.problems.block import Block
 from gradient_routes.problems.data import csv
 from gradient_routes.problems.data.csv import read_columns
 from gradient_routes.problems.data.probes import Measured, groups, read_probes
-from gradient_routes.problems.data.table import Table, read_table
+from gradient_routes.problems.data.table import Group, Table, read_table
 from gradient_routes.problems.data.units import UNITS, factor, quantity, zero
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.elements import Geometry
@@ -218,6 +218,17 @@ def test_units_are_a_closed_list() -> None:
     for text in ("nan", "inf", "x", "", "um", "0,4um", "1e999um", "0.4 parsec"):
         with pytest.raises(InputError, match="test: "):
             quantity(text, "length", "test")
+
+
+@pytest.mark.parametrize("header", ["t [min],T [degC]", "T [degC],t [min]", "Time [min],Temperature [degC]"])
+def test_a_time_and_a_temperature_are_told_apart(header: str, file: File) -> None:
+    """Their names differ by case alone, which does not matter elsewhere."""
+    groups = (Group(("t",), "time"), Group(("T",), "temperature"))
+    rows = "20,1.5\n" if header.startswith("T [") else "1.5,20\n"
+    table = read_table(file(f"{header}\n{rows}"), groups)
+    assert (table.columns["t"].tolist(), table.columns["T"].tolist()) == ([90.0], [293.15])
+    with pytest.raises(InputError, match=re.escape("no column t; it has T [degC]")):
+        read_table(file("T [degC]\n20\n"), groups)
 
 
 # --- points
