@@ -138,6 +138,7 @@ ORDER = (
     "coupon",
     "advection",
     "vibrating-bar",
+    "impact-block",
     "fd-one-sided",
     "fd-central",
     "complex-step",
