@@ -1,9 +1,6 @@
 """The impact block: the hyperelastic block with mass, thrown against a rigid plane, marched in time.
 
-u' = v,    M v' = -f(u, p) - sum over nodes a of the bottom of w_a q(g_a) dg_a/du,    g_a = -(gap + e . u_a)
-
-by the trapezoidal rule (Newmark, beta = 1/4, gamma = 1/2). f are the internal forces of the block, q [Pa] the law of a
-stop, and w_a [m^2] the area that belongs to a node: every node that may touch is an element of its own.
+u' = v,    M v' = -f(u, p) - those of the plane, by the trapezoidal rule (Newmark, beta = 1/4, gamma = 1/2)
 """
 
 from __future__ import annotations
@@ -18,8 +15,10 @@ import numpy as np
 
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.contact import STOP_WIDTH, CompliantStop, make_stop
+from gradient_routes.problems.data.histories import Histories
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
+from gradient_routes.problems.dynamics.impulses import ImpulsesByMaterial
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions
 from gradient_routes.problems.fem.elements import SolidElement
@@ -29,12 +28,12 @@ from gradient_routes.problems.matrices.sparse import SymmetricSparse
 from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.mechanics import solid_options as options
 from gradient_routes.problems.mechanics.mass import Mass, element_masses
+from gradient_routes.problems.mechanics.rigid_plane import RigidPlane
 from gradient_routes.problems.problem import (
     Array,
     End,
     Linearization,
     Offers,
-    Operator,
     ParameterView,
     Traced,
 )
@@ -135,7 +134,7 @@ class ImpactBlock(Transient):
             )
         made = make_stop(stop, gap, k_c, width, self.name, GAP)
         assert isinstance(made, CompliantStop)
-        self.plane = made
+        self.plane = RigidPlane.below(mesh, bc, made)
         v = _velocity(velocity, self.name)
         if -v[2] * steps * dt <= gap:
             raise InputError(
@@ -143,60 +142,24 @@ class ImpactBlock(Transient):
                 " changes nothing - throw faster, or march longer"
             )
         self.v_0 = np.tile(v, self.n // 3)
-        self.noise, self.seed = noise, seed
-        self.M = self._mass_matrix(density, mass)
+        self.seed = seed
+        i, j = np.triu_indices(3 * mesh.geometry.nodes.shape[1])
+        self.M: Any = self.solid.pattern.assemble(element_masses(mesh.geometry, density, mass)[:, i, j])
         self.row = density * float(mesh.geometry.metric[1].sum()) / (self.n // 3) / dt
-        self.touching, self.area = self._nodes_that_touch()
-        self.sensors = self._dofs_of(sensors)
-        self.d: Array | None = None  # (T, m) [m]
+        self.histories = Histories(self.name, steps, 2 * self.n, dt, self._dofs_of(sensors), self._name_of, noise)
         self._kept: tuple[Array, Array, Array] | None = None
         self.parameters, self.regularization = self.body.parameters, self.body.regularization
 
-    # --- the body
-
-    def _mass_matrix(self, density: float, kind: Mass) -> SymmetricSparse:
-        pattern, geometry = self.solid.pattern, self.solid.mesh.geometry
-        i, j = np.triu_indices(3 * geometry.nodes.shape[1])
-        M: SymmetricSparse = pattern.assemble(element_masses(geometry, density, kind)[:, i, j])  # type: ignore[assignment]
-        return M
-
-    def _nodes_that_touch(self) -> tuple[Array, Array]:
-        """Of the bottom: the numbers of their displacements u_z in u (m,), and their areas (m,) [m^2]."""
-        facets, X = self.solid.mesh.boundary("bottom", surface=True), self.solid.mesh.geometry.X
-        area = np.zeros(len(X))
-        np.add.at(area, facets.nodes, np.einsum("fqa,fq->fa", facets.N, facets.areas(X, np)))
-        nodes = np.flatnonzero(area > 1e-9 * area.max())  # pressure does no work on the corners of tet10
-        return np.asarray(self.solid.bc.index[0, nodes, 2]), area[nodes]
-
-    def _dofs_of(self, sensors: str) -> Array:
-        mesh = self.solid.mesh
-        nodes = np.unique(mesh.geometry.nodes) if sensors == "everywhere" else mesh.boundary(sensors).node_set
-        return np.asarray(self.solid.bc.index[0, nodes].ravel())
-
     # --- the equations
-
-    def penetration(self, u: Any) -> Any:
-        """g of displacements u (.., n), (.., m) [m]."""
-        return -u[..., self.touching] - self.plane.gap
-
-    def pressed(self, u: Any, xp: Any = np) -> Any:
-        """Forces of the plane (n,) [N], as they stand in R."""
-        q = -self.area * self.plane.law.force(self.penetration(u), xp)
-        return xp.zeros(self.n, dtype=q.dtype).at[self.touching].add(q) if xp is not np else self._spread(q)
-
-    def _spread(self, q: Array) -> Array:
-        f = np.zeros(self.n, q.dtype)
-        f[self.touching] = q
-        return f
 
     def forces(self, u: Array, p: Array) -> Array:
         """f and those of the plane, (n,) [N]."""
-        return np.asarray(self.solid.residual(u, p) + self.pressed(u))
+        return np.asarray(self.solid.residual(u, p) + self.plane.forces(u))
 
     def stiffness(self, u: Array, p: Array) -> SymmetricSparse:
         """Their derivative by u."""
         K: SymmetricSparse = self.solid.tangent(u, p)
-        return K.plus_diagonal(self._spread(self.area * self.plane.law.stiffness(self.penetration(u))))
+        return K.plus_diagonal(self.plane.stiffness(u))
 
     def initial_state(self, p: Any, xp: Any = np) -> Any:
         return xp.concatenate([xp.zeros(self.n), xp.asarray(self.v_0)]).astype(p.dtype)
@@ -235,15 +198,11 @@ class ImpactBlock(Transient):
         return StepMatrix(sign * self.row, -self.row * half, scaled, M)
 
     def linearize(self, u: Array, p: Array) -> Linearization:
-        J_u = np.zeros((self.steps, 2 * self.n), dtype=u.dtype)
-        J_u[:, self.sensors] = self._read(u) - self.data()
-        x, _ = self.history(u, p)
-        return Linearization(
-            ImpulsesByMaterial([self.solid.R_p(x_t, p) for x_t in x], self.h), J_u.ravel(), self.phi_by(p)
-        )
+        f_p = [self.solid.R_p(x, p) for x in self.history(u, p)[0]]
+        return Linearization(ImpulsesByMaterial(f_p, self.h), self.histories.misfit_gradient(u), self.phi_by(p))
 
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
-        return 0.5 * xp.sum((self._read(u, xp) - self.data()) ** 2) + self.phi(p, xp)
+        return self.histories.misfit(u, xp) + self.phi(p, xp)
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.body.theta(p, xp)) if self.alpha else 0.0
@@ -264,7 +223,7 @@ class ImpactBlock(Transient):
     def _traced_forces(self, u: Any, p: Any) -> Any:
         from gradient_routes.problems.jax64 import jnp
 
-        return self.solid.traced_residual(u, p) + self.pressed(u, jnp)
+        return self.solid.traced_residual(u, p) + self.plane.forces(u, jnp)
 
     # --- one step
 
@@ -285,7 +244,7 @@ class ImpactBlock(Transient):
         return kept[2]
 
     def step_objective(self, t: Any, u: Any, p: Any, xp: Any = np) -> Any:
-        return 0.5 * xp.sum((u[self.sensors] - xp.asarray(self.data())[t - 1]) ** 2)
+        return self.histories.step_misfit(t, u, xp)
 
     def step_tangent(self, t: int, u: Array, v: Array, p: Array) -> StepMatrix:
         return self._matrix(1.0, self.stiffness(u[: self.n], p))
@@ -294,10 +253,9 @@ class ImpactBlock(Transient):
         return self._matrix(-1.0, self.stiffness(v[: self.n], p))
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
-        J_u = np.zeros_like(u)
-        J_u[self.sensors] = u[self.sensors] - self.data()[t - 1]
-        by_p = [self.solid.R_p(z[: self.n], p) for z in (v, u)]
-        return Linearization(ImpulsesByMaterial(by_p, self.h), J_u, np.zeros_like(p))
+        f_p = [self.solid.R_p(z[: self.n], p) for z in (v, u)]
+        J_u = self.histories.step_misfit_gradient(t, u)
+        return Linearization(ImpulsesByMaterial(f_p, self.h), J_u, np.zeros_like(p))
 
     def step_initial(self, t: int, v: Array, p: Array) -> Array:
         """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
@@ -305,68 +263,42 @@ class ImpactBlock(Transient):
         return np.concatenate([x + self.h * velocity, velocity])
 
     def step_active_set(self, t: int, u: Array, p: Array) -> Hashable | None:
-        """The nodes of the bottom, counted from 1, that touch."""
-        g = self.penetration(u[: self.n]).real
-        if self.plane.law.active_set(0.0) is None:
-            return None
-        return ",".join(str(node) for node in np.flatnonzero(g > 0.0) + 1) or "open"
+        return self.plane.active_set(u[: self.n])
 
     # --- data
 
-    def _read(self, u: Any, xp: Any = np) -> Any:
-        """Displacements at the sensors, (T, m) [m]."""
-        return xp.reshape(u, (self.steps, -1))[:, self.sensors]
+    def _dofs_of(self, sensors: str) -> Array:
+        mesh = self.solid.mesh
+        nodes = np.unique(mesh.geometry.nodes) if sensors == "everywhere" else mesh.boundary(sensors).node_set
+        return np.asarray(self.solid.bc.index[0, nodes].ravel())
+
+    def _name_of(self, i: int) -> str:
+        x = ", ".join(f"{c:.3g}" for c in self.solid.mesh.geometry.X[i // 3])
+        return f"u_{AXES[i % 3]} at ({x})"
 
     def observation(self, u: Array, p: Array) -> Observation:
-        from scipy import sparse
-
-        at = (2 * self.n * np.arange(self.steps)[:, None] + self.sensors).ravel()
-        S = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), self.n_state))
-        label = self._label(at)
-        return Observation(self._read(u).ravel(), self.data().ravel(), S, sigma=self.noise, label=label)
+        return self.histories.observation(u)
 
     def candidates(self) -> Candidates:
         """Every displacement component of every node in every step."""
-        at = (2 * self.n * np.arange(self.steps)[:, None] + np.arange(self.n)).ravel()
-        return Candidates(at, self._label(at), self.solid.mesh.geometry.X[at % (2 * self.n) // 3])
-
-    def _label(self, at: Array) -> Any:
-        X = self.solid.mesh.geometry.X
-
-        def label(k: int) -> str:
-            t, i = divmod(int(at[k]), 2 * self.n)
-            where = ", ".join(f"{x:.3g}" for x in X[i // 3])
-            return f"u_{AXES[i % 3]} at ({where}), {(t + 1) * self.h:.3g} s"
-
-        return label
+        return self.histories.candidates(np.arange(self.n), np.repeat(self.solid.mesh.geometry.X, 3, axis=0))
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
         _, theta, by_p = self.body.prior(p)
         return self.regularization, theta, by_p
 
-    def data(self) -> Array:
-        """d (T, m) [m]. Raises InputError where synthetic data are not made yet."""
-        if self.d is None:
-            raise InputError(
-                f"{self.name}: synthetic data are not made yet - solve for them:"
-                " gradient_routes.routes.synthetic_data.with_synthetic_data(block)"
-            )
-        return self.d
-
     def truth(self) -> Array | None:
         return self.body.truth()
 
     def twin(self) -> ImpactBlock | None:
-        return self._with_data(np.zeros((self.steps, len(self.sensors)))) if self.d is None else None
+        return self._with(self.histories.zeros()) if self.histories.d is None else None
 
     def observed(self, u: Array, seed: int | None = None) -> ImpactBlock:
-        rng = np.random.default_rng(self.seed if seed is None else seed)
-        d = self._read(u)
-        return self._with_data(d + self.noise * rng.standard_normal(d.shape))
+        return self._with(self.histories.synthesized(u, self.seed if seed is None else seed))
 
-    def _with_data(self, d: Array) -> ImpactBlock:
+    def _with(self, histories: Histories) -> ImpactBlock:
         other = copy.copy(self)
-        other.d = d
+        other.histories = histories
         return other
 
     def stated(self, p: Array) -> dict[str, Any]:
@@ -378,28 +310,6 @@ class ImpactBlock(Transient):
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         x = self.parameters.position
         return ParameterView({} if x is None else dict(zip(AXES, x.T, strict=True)))
-
-
-class ImpulsesByMaterial:
-    """R_p of m steps, (m 2 n, n_p): h/2 (f_p + f_p before) in the rows of v, from f_p of the m + 1 states."""
-
-    def __init__(self, f_p: list[Operator], h: float, transposed: bool = False) -> None:
-        self.f_p, self.h, self.transposed = f_p, h, transposed
-
-    @property
-    def T(self) -> ImpulsesByMaterial:
-        return ImpulsesByMaterial(self.f_p, self.h, not self.transposed)
-
-    def __matmul__(self, x: Array) -> Array:
-        m, half = len(self.f_p) - 1, 0.5 * self.h
-        if self.transposed:
-            lam = x.reshape(m, 2, -1)[:, 1]
-            none = np.zeros_like(lam[:1])
-            along = half * (np.concatenate([none, lam]) + np.concatenate([lam, none]))
-            return np.asarray(sum(f_p.T @ w for f_p, w in zip(self.f_p, along, strict=True)))
-        f = np.stack([f_p @ x for f_p in self.f_p])
-        driven = half * (f[1:] + f[:-1])
-        return np.stack([np.zeros_like(driven), driven], axis=1).ravel()
 
 
 def _velocity(text: str, who: str) -> Array:

@@ -88,13 +88,13 @@ def test_the_plane_changes_momentum_by_its_impulse_and_no_energy() -> None:
     """A linear body: half the sum of u.K u and v.M v, and of a linear spring while it is pressed."""
     block = made(law="linear", stop="penalty", steps=12, dt=0.1)
     p, (u, v) = block.parameters.start, solved(block)
-    pressed = -np.stack([block.pressed(x) for x in u]).sum(axis=1)
+    pressed = -np.stack([block.plane.forces(x) for x in u]).sum(axis=1)
     gained = np.diff(moved(block, v)[:, 2::3].sum(axis=1))
     np.testing.assert_allclose(gained, 0.05 * (pressed[1:] + pressed[:-1]), atol=1e-13)
     K = block.solid.tangent(0.0 * u[0], p)
-    g = np.maximum(block.penetration(u), 0.0)
+    g = np.maximum(block.plane.penetration(u), 0.0)
     body = 0.5 * np.array([x @ (K @ x) for x in u]) + 0.5 * (v * moved(block, v)).sum(axis=1)
-    total = body + 0.5 * block.plane.law.k_c * (g**2 @ block.area)
+    total = body + 0.5 * block.plane.stop.law.k_c * (g**2 @ block.plane.area)
     touching = (g > 0.0).any(axis=1)
     assert 2 < touching.sum() < 12
     same = touching[1:] == touching[:-1]
