@@ -37,6 +37,7 @@ from gradient_routes.problems.problem import (
     ParameterView,
     Traced,
 )
+from gradient_routes.problems.rates import Rates
 from gradient_routes.problems.transient import Transient
 
 STEPS_MAX, STATE_MAX = 10**6, 10**8
@@ -164,7 +165,7 @@ class ImpactBlock(Transient):
     def initial_state(self, p: Any, xp: Any = np) -> Any:
         return xp.concatenate([xp.zeros(self.n), xp.asarray(self.v_0)]).astype(p.dtype)
 
-    def rows(self, u: Any, v: Any, f: Any, xp: Any = np) -> Any:
+    def impulses(self, u: Any, v: Any, f: Any, xp: Any = np) -> Any:
         """R (m, 2, n) of m steps, from displacements, velocities and forces (m + 1, n) before and after them."""
         moved = self.row * (u[1:] - u[:-1] - 0.5 * self.h * (v[1:] + v[:-1]))
         driven = self._times_mass(v[1:] - v[:-1], xp) + 0.5 * self.h * (f[1:] + f[:-1])
@@ -182,9 +183,10 @@ class ImpactBlock(Transient):
         z = xp.concatenate([self.initial_state(p, xp)[None], xp.reshape(U, (self.steps, -1))])
         return z[:, : self.n], z[:, self.n :]
 
-    def residual(self, u: Array, p: Array) -> Array:
-        x, v = self.history(u, p)
-        return np.asarray(self.rows(x, v, np.stack([self.forces(x_t, p) for x_t in x])).ravel())
+    def rows(self, t_0: int, states: Array, p: Array) -> Array:
+        u, v = states[:, : self.n], states[:, self.n :]
+        f = np.stack([self._forces_before(u[0], p), *(self.forces(u_t, p) for u_t in u[1:])])
+        return np.asarray(self.impulses(u, v, f).reshape(len(u) - 1, -1))
 
     def tangent(self, u: Array, p: Array) -> Recurrence:
         K = [self.stiffness(x, p) for x in self.history(u, p)[0]]
@@ -197,12 +199,10 @@ class ImpactBlock(Transient):
         scaled, M = replace(K, data=half * K.data), replace(self.M, data=sign * self.M.data)
         return StepMatrix(sign * self.row, -self.row * half, scaled, M)
 
-    def linearize(self, u: Array, p: Array) -> Linearization:
-        f_p = [self.solid.R_p(x, p) for x in self.history(u, p)[0]]
-        return Linearization(ImpulsesByMaterial(f_p, self.h), self.histories.misfit_gradient(u), self.phi_by(p))
-
-    def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
-        return self.histories.misfit(u, xp) + self.phi(p, xp)
+    def rates(self, t_0: int, states: Array, p: Array) -> Rates:
+        J, J_u = self.histories.step_misfits(t_0, states[1:])
+        f_p = [self.solid.R_p(u, p) for u in states[:, : self.n]]
+        return Rates(J, ImpulsesByMaterial(f_p, self.h), J_u, np.zeros((len(J), len(p))))
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.body.theta(p, xp)) if self.alpha else 0.0
@@ -216,9 +216,9 @@ class ImpactBlock(Transient):
 
         def residual(U: Any, p: Any) -> Any:
             u, v = self.history(U, p, jnp)
-            return self.rows(u, v, jax.vmap(lambda u: self._traced_forces(u, p))(u), jnp).ravel()
+            return self.impulses(u, v, jax.vmap(lambda u: self._traced_forces(u, p))(u), jnp).ravel()
 
-        return Traced(residual, lambda U, p: self.objective(U, p, jnp))
+        return Traced(residual, lambda U, p: self.histories.misfit(U, jnp) + self.phi(p, jnp))
 
     def _traced_forces(self, u: Any, p: Any) -> Any:
         from gradient_routes.problems.jax64 import jnp
@@ -229,12 +229,10 @@ class ImpactBlock(Transient):
 
     def step_residual(self, t: Any, u: Any, v: Any, p: Any, xp: Any = np) -> Any:
         z = xp.stack([v, u])
-        f = (
-            [self._forces_before(v[: self.n], p), self.forces(u[: self.n], p)]
-            if xp is np
-            else [self._traced_forces(one[: self.n], p) for one in (v, u)]
-        )
-        return self.rows(z[:, : self.n], z[:, self.n :], xp.stack(f), xp).ravel()
+        if xp is np:
+            return self.rows(t - 1, z, p)[0]
+        f = xp.stack([self._traced_forces(one[: self.n], p) for one in (v, u)])
+        return self.impulses(z[:, : self.n], z[:, self.n :], f, xp).ravel()
 
     def _forces_before(self, u: Array, p: Array) -> Array:
         """Those of the state that a step starts from: the same in all its iterations."""
@@ -253,9 +251,8 @@ class ImpactBlock(Transient):
         return self._matrix(-1.0, self.stiffness(v[: self.n], p))
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
-        f_p = [self.solid.R_p(z[: self.n], p) for z in (v, u)]
-        J_u = self.histories.step_misfit_gradient(t, u)
-        return Linearization(ImpulsesByMaterial(f_p, self.h), J_u, np.zeros_like(p))
+        rates = self.rates(t - 1, np.stack([v, u]), p)
+        return Linearization(rates.R_p, rates.J_u[0], rates.J_p[0])
 
     def step_initial(self, t: int, v: Array, p: Array) -> Array:
         """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""

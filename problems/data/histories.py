@@ -60,20 +60,15 @@ class Histories:
     def misfit(self, u: Any, xp: Any = np) -> Any:
         return 0.5 * xp.sum((self.read(u, xp) - self.data) ** 2)
 
-    def misfit_gradient(self, u: Array) -> Array:
-        """S^T (S u - d), (T n,)."""
-        by_u = np.zeros((self.steps, self.n), u.dtype)
-        by_u[:, self.at] = self.read(u) - self.data
-        return by_u.ravel()
-
     def step_misfit(self, t: Any, u: Any, xp: Any = np) -> Any:
         """That of the state u (n,) after step t, which is traced where xp is jax.numpy."""
         return 0.5 * xp.sum((u[self.at] - xp.asarray(self.data)[t - 1]) ** 2)
 
-    def step_misfit_gradient(self, t: int, u: Array) -> Array:
-        by_u = np.zeros_like(u)
-        by_u[self.at] = u[self.at] - self.data[t - 1]
-        return by_u
+    def step_misfits(self, t_0: int, u: Array) -> tuple[Array, Array]:
+        """Those of the states u (k, n) after steps t_0 + 1..t_0 + k, (k,), and S^T (S u - d), (k, n)."""
+        off, by_u = u[:, self.at] - self.data[t_0 : t_0 + len(u)], np.zeros_like(u)
+        by_u[:, self.at] = off
+        return 0.5 * (off**2).sum(axis=1), by_u
 
     def observation(self, u: Array) -> Observation:
         from scipy import sparse

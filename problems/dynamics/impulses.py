@@ -27,3 +27,9 @@ class ImpulsesByMaterial:
         f = np.stack([f_p @ x for f_p in self.f_p])
         driven = half * (f[1:] + f[:-1])
         return np.stack([np.zeros_like(driven), driven], axis=1).ravel()
+
+    def each_transposed(self, lam: Array) -> Array:
+        """R_p^T lam of every step by itself, (m, n_p), from lam (m, 2 n)."""
+        driven = 0.5 * self.h * lam.reshape(len(lam), 2, -1)[:, 1]
+        steps = zip(self.f_p[1:], self.f_p[:-1], driven, strict=True)
+        return np.stack([f_p.T @ w + before.T @ w for f_p, before, w in steps])
