@@ -65,6 +65,17 @@ def test_gradients_hold_on_each_branch_of_a_law_in_pieces(stop: str) -> None:
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-10, route.name
 
 
+def test_checkpoints_change_steps_not_the_gradient() -> None:
+    block, found = made(), {}
+    p, steps = block.parameters.start, {"all": 4, "sqrt": 5, "none": 7}
+    for checkpoint, count in steps.items():
+        model = Model(block)
+        found[checkpoint] = adjoint.prepare(model, p, checkpoint=checkpoint)(p)
+        assert model.tally.work.steps == count
+        assert np.array_equal(found[checkpoint].gradient, found["all"].gradient)
+    assert relative_error(found["all"].gradient, adjoint.prepare(Model(block), p)(p).gradient) < 1e-12
+
+
 @pytest.mark.parametrize("element", ["hex8", "tet4", "tet10"])
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
 def test_a_throw_is_rigid_until_it_touches_and_has_all_the_mass(element: str, mass: str) -> None:
