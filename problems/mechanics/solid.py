@@ -268,5 +268,7 @@ def _by_hand(o: SimpleNamespace, law: MaterialLaw, who: str) -> bool:
     exist = law.numpy is not None and o.unknown in MATERIAL and o.load != "follower"
     use_numpy = exist if o.derivatives is None else o.derivatives == "hand"
     if use_numpy and law.numpy is None:
-        raise InputError(f"{who}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad")
+        raise InputError(
+            f"{who}: derivatives=hand exist for neo-hookean, mooney-rivlin and arap, not {o.law} - take ad"
+        )
     return use_numpy
