@@ -87,14 +87,14 @@ class Block(Solid):
         phi_width: options.PhiWidth = PHI_WIDTH,
     ) -> None:
         given = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        options.check("block", SimpleNamespace(**given), "xyz")
+        options.check(self.name, SimpleNamespace(**given), "xyz")
         from gradient_routes.problems.mechanics.materials import LAWS
 
         if mesh:
-            body = read_mesh("block", mesh, mesh_unit)
+            body = read_mesh(self.name, mesh, mesh_unit)
         else:
-            Lx, Ly, Lz = options.lengths("block", size, 3)
-            body = box_mesh("block", element, (nx or n, ny or n, nz or n), (Lx, Ly, Lz))
+            Lx, Ly, Lz = options.lengths(self.name, size, 3)
+            body = box_mesh(self.name, element, (nx or n, ny or n, nz or n), (Lx, Ly, Lz))
         super().__init__(given, body, LAWS[law], DIRECTIONS[load][:cases])
 
     def case(self) -> dict[str, Any]:

@@ -52,7 +52,7 @@ class Penalty:
         return xp.where(g.real > 0.0, self.k_c * g, 0.0)
 
     def stiffness(self, g: Any) -> Any:
-        return self.k_c if g.real > 0.0 else 0.0
+        return np.where(g.real > 0.0, self.k_c, 0.0)[()]
 
     def active_set(self, g: Any) -> str | None:
         return "closed" if g.real > 0.0 else "open"
@@ -74,7 +74,8 @@ class Softplus:
 
     def stiffness(self, g: Any) -> Any:
         x = g / self.width
-        return self.k_c / (1.0 + np.exp(-x)) if x.real > 0.0 else self.k_c * np.exp(x) / (1.0 + np.exp(x))
+        e = np.exp(np.where(x.real > 0.0, -x, x))
+        return (self.k_c * np.where(x.real > 0.0, 1.0, e) / (1.0 + e))[()]
 
     def active_set(self, g: Any) -> str | None:
         return None
@@ -94,7 +95,7 @@ class Quadratic:
 
     def stiffness(self, g: Any) -> Any:
         w = self.width
-        return 0.0 if g.real < -w else self.k_c if g.real > w else self.k_c * (g + w) / (2.0 * w)
+        return np.where(g.real < -w, 0.0, np.where(g.real > w, self.k_c, self.k_c * (g + w) / (2.0 * w)))[()]
 
     def active_set(self, g: Any) -> str | None:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,15 @@ import numpy as np
 from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.recurrence import Recurrence
-from gradient_routes.problems.problem import Array, Linearization, Operator, ParameterView, Problem, Traced
+from gradient_routes.problems.problem import (
+    Array,
+    Linearization,
+    Offers,
+    Operator,
+    ParameterView,
+    Problem,
+    Traced,
+)
 from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
 
@@ -29,6 +38,11 @@ class Transient(Problem):
     """
 
     constant: bool = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.step_active_set is Transient.step_active_set:
+            cls.offers &= ~Offers.ACTIVE_SET
 
     # --- one step: what a problem gives
 
@@ -169,10 +183,11 @@ class Transient(Problem):
         """What dJ/dp owes to the initial state, mu_0 . du_0/dp with mu_0 = R_v^T lam_1 (n_p,); None where u_0 does not
         depend on p. The rest is that of the rates.
         """
-        by, n = self.initial_by(p), self.n_step
-        if by is None:
+        n = self.n_step
+        if self.initial_by(p) is None:
             return None
-        return np.asarray(by.T @ (self.step_coupling(1, u[:n], self.initial_state(p), p).T @ lam[:n]))
+        R_v = self.step_coupling(1, u[:n], self.initial_state(p), p)
+        return self.pulled_to_initial(R_v.T @ lam[:n], p)
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         """The shares of the initial state and of the rates, where u_0 depends on p and lam is known."""
@@ -181,6 +196,10 @@ class Transient(Problem):
             return ParameterView()
         lin = self.linearize(u, p)
         return ParameterView({"by u_0": initial, "by rates": lin.J_p + lin.R_p.T @ lam - initial})
+
+    def active_set(self, u: Array, p: Array) -> ActiveSteps | None:
+        sets = [self.step_active_set(t, u_t, p) for t, u_t in enumerate(u.reshape(self.steps, -1), start=1)]
+        return None if sets[0] is None else ActiveSteps(sets)
 
     def traced(self) -> Traced:
         """R and J of all steps by one trace of a step."""
@@ -198,6 +217,22 @@ class Transient(Problem):
             return J.sum() + self.phi(p, jnp)
 
         return Traced(residual, objective)
+
+
+class ActiveSteps(tuple[Hashable, ...]):
+    """The active set after every step."""
+
+    def flips(self, other: ActiveSteps) -> list[int]:
+        """The steps, counted from 1, after which it is another."""
+        return [t for t, (a, b) in enumerate(zip(self, other, strict=True), start=1) if a != b]
+
+    def __str__(self) -> str:
+        """Such as `open to 4, 1,2 to 7, open to 20`."""
+        runs, t = [], 0
+        for one, several in groupby(self):
+            t += len(list(several))
+            runs.append(f"{one} to {t}")
+        return ", ".join(runs)
 
 
 def stepwise(t_0: int, states: Array) -> Iterator[tuple[int, Array, Array]]:

@@ -247,13 +247,6 @@ class VibratingBar(Transient):
         other.stop, other.linear, other.constant = stop, False, False
         return other
 
-    def active_set(self, u: Array, p: Array) -> str | None:
-        """The steps, counted from 1, after which a stop of the penalty law is closed."""
-        if self.stop is None or self.stop.law.active_set(0.0) is None:
-            return None
-        closed = np.flatnonzero(u.reshape(self.steps, -1)[:, self.n - 1].real > self.stop.gap) + 1
-        return ",".join(map(str, closed)) or "open"
-
     def _check_stable(self, k: Array) -> None:
         """h <= 2 / omega_max for an explicit scheme, omega_max^2 bounded by the largest row sum of M^{-1} K."""
         if not self.scheme.explicit:

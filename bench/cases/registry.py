@@ -140,6 +140,7 @@ ORDER = (
     "heat",
     "advection-in-time",
     "vibrating-bar",
+    "impact-block",
     "fd-one-sided",
     "fd-central",
     "complex-step",

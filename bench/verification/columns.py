@@ -20,7 +20,12 @@ CHECKS = (
     Column("tightened_plateau", "REAL", "1", "the same with the forward solve tightened"),
     Column("refined_plateau", "REAL", "1", "|(g - exact) w| / |exact w| on a mesh of half the size"),
     Column("order_in_mesh_size", "REAL", "1", "k of a plateau ~ h^k"),
-    Column("active_set_changes", "INTEGER", "1", "inside the stencil of the deciding line"),
+    Column(
+        "active_set_changes",
+        "INTEGER",
+        "1",
+        "inside the stencil of the deciding line; of a march, steps whose set flips",
+    ),
     Column("culprit", "TEXT", "", "the factor, component or functional that is wrong"),
     Column("worst_components", "TEXT", "", "wrong components: given and found", json=True),
     Column("findings", "TEXT", "", "second evidence: name, value, limit", json=True),

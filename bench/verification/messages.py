@@ -108,7 +108,7 @@ def _on_agreement(check: Check, reading: Reading) -> tuple[str, str]:
 def _on_kink(check: Check, reading: Reading) -> tuple[str, str]:
     where = f"along {reading.name}"
     at = "" if reading.level is None else f" of step {reading.level.h_min:.1e}"
-    inside = f"the active set changes {reading.inside} times inside the stencil{at}" if reading.inside else ""
+    inside = f"{reading.changed} inside the stencil{at}" if reading.inside else ""
     if reading.kink is None:
         says = f"{inside} {where}: J has a kink there, and difference quotients mix its two slopes"
     else:

@@ -17,6 +17,7 @@ from gradient_routes.bench.verification.plateau import DIFFERENT, Level, level, 
 from gradient_routes.bench.verification.quotients import Quotients
 from gradient_routes.bench.verification.subject import Subject
 from gradient_routes.problems.problem import Array
+from gradient_routes.problems.transient import ActiveSteps
 
 Says = Literal["agrees", "plateau", "kink", "noise", "nothing"]
 RESOLVED = 1e-3  # largest relative uncertainty of a quotient that can judge a gradient
@@ -29,6 +30,19 @@ NATURAL = 1e-3  # steps from which on the change of J is one of natural size
 
 
 @dataclass(frozen=True)
+class Changes:
+    """Of the active set; of a march in time, the steps after which it is another."""
+
+    count: int
+    of_steps: bool
+
+    def __str__(self) -> str:
+        if not self.of_steps:
+            return f"the active set changes {self.count} times"
+        return f"the active set of {self.count} step{'s' if self.count > 1 else ''} flips"
+
+
+@dataclass(frozen=True)
 class Reading:
     """Quotients compared with the slope of a gradient.
 
@@ -36,7 +50,7 @@ class Reading:
     size     |g w|_2, the expected slope along natural changes
     accepted relative error that counts as agreement
     by_nature absolute error of slopes that the gradient may have by its nature, as one by finite differences
-    changes  step -> number of active-set changes inside its stencil, where the subject knows
+    changes  step -> active-set changes inside its stencil, where the subject knows
     natural_change  `change` of another line, sampled more widely
     eps      of the precision of J; repeatable: whether J is the same again at the same point
     """
@@ -46,7 +60,7 @@ class Reading:
     size: float
     accepted: float
     by_nature: float = 0.0
-    changes: Callable[[float], int] | None = None
+    changes: Callable[[float], Changes] | None = None
     natural_change: float = 0.0
     eps: float = DOUBLE
     repeatable: bool = True
@@ -194,9 +208,14 @@ class Reading:
         return abs(self.level.value) <= room
 
     @cached_property
-    def inside(self) -> int | None:
+    def changed(self) -> Changes | None:
         """Active-set changes inside the smallest stencil of the level."""
         return None if self.changes is None or self.level is None else self.changes(self.level.h_min)
+
+    @property
+    def inside(self) -> int | None:
+        """Their number."""
+        return None if self.changed is None else self.changed.count
 
     @cached_property
     def says(self) -> Says:
@@ -235,7 +254,7 @@ class Reading:
         return fit(self.quotients.h, np.abs(off) / scale, self.noise / scale / quieter)
 
 
-def stencil_changes(subject: Subject, v: Array) -> Callable[[float], int] | None:
+def stencil_changes(subject: Subject, v: Array) -> Callable[[float], Changes] | None:
     """step -> changes of the active set from p - h v over p to p + h v; points where it is unknown do not count."""
     active_set = subject.active_set
     if active_set is None:
@@ -246,12 +265,16 @@ def stencil_changes(subject: Subject, v: Array) -> Callable[[float], int] | None
             return None
         try:
             found = active_set(q.copy())
-            return found if found is None else repr(np.asarray(found).tolist())
+            keep = found is None or isinstance(found, ActiveSteps)
+            return found if keep else repr(np.asarray(found).tolist())
         except FOREIGN:
             return None
 
-    def changes(h: float) -> int:
+    def changes(h: float) -> Changes:
         known = [found for t in (-1.0, 0.0, 1.0) if (found := at(subject.p + t * h * v)) is not None]
-        return sum(a != b for a, b in pairwise(known))
+        marched = [found for found in known if isinstance(found, ActiveSteps)]
+        if marched:
+            return Changes(len({t for a, b in pairwise(marched) for t in a.flips(b)}), of_steps=True)
+        return Changes(sum(a != b for a, b in pairwise(known)), of_steps=False)
 
     return changes

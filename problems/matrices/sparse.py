@@ -75,6 +75,16 @@ class SymmetricSparse:
     def __matmul__(self, v: Array) -> Array:
         return np.asarray(self.upper @ v + self.upper.T @ v - self.diagonal * v)
 
+    def plus(self, c: Any, B: SymmetricSparse) -> SymmetricSparse:
+        """A + c B, of one pattern."""
+        return SymmetricSparse(self.pattern, self.data + c * B.data)
+
+    def plus_diagonal(self, d: Array) -> SymmetricSparse:
+        """A + diag(d), d (n,)."""
+        data = self.data.astype(np.result_type(self.data, d))
+        data[self.pattern.indptr[:-1]] += d
+        return SymmetricSparse(self.pattern, data)
+
     @property
     def norm(self) -> float:
         """|A|_inf."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,15 @@ class Banded:
         y[..., :-1] += self.upper * v[..., 1:]
         return y
 
+    def plus(self, c: Any, B: Banded) -> Banded:
+        """A + c B."""
+        return Banded(self.lower + c * B.lower, self.main + c * B.main, self.upper + c * B.upper)
+
+    @property
+    def dense(self) -> Array:
+        """(N, N)."""
+        return np.asarray(np.diag(self.main) + np.diag(self.lower, -1) + np.diag(self.upper, 1))
+
     @property
     def norm(self) -> float:
         sums = np.abs(self.main).astype(float)
@@ -40,19 +50,17 @@ class Banded:
         return float(sums.max())
 
 
-def combined(X: Banded, factor: float, Y: Banded) -> Banded:
-    """X + factor Y."""
-    return Banded(X.lower + factor * Y.lower, X.main + factor * Y.main, X.upper + factor * Y.upper)
-
-
 @dataclass(frozen=True)
 class StepMatrix:
-    """[[a I, b I], [K, D]] of (u, v), each (N,): K the stiffness, D mass and damping, as a step weighs them."""
+    """[[a I, b I], [K, D]] of (u, v), each (N,): K the stiffness, D mass and damping, as a step weighs them.
+
+    K and D are of one kind, which has @, T, norm and plus: Banded or SymmetricSparse.
+    """
 
     a: float
     b: float
-    K: Banded
-    D: Banded
+    K: Any
+    D: Any
     transposed: bool = False
 
     @property
@@ -67,15 +75,10 @@ class StepMatrix:
         return np.concatenate([self.a * u + self.b * v, self.K @ u + self.D @ v])
 
     @cached_property
-    def schur(self) -> Banded:
+    def schur(self) -> Any:
         """D - b/a K: what is left for v after u = (r - b v)/a."""
-        return combined(self.D, -self.b / self.a, self.K)
-
-    @property
-    def dense(self) -> Array:
-        """(2 N, 2 N)."""
-        return np.stack([self @ e for e in np.eye(2 * len(self.K.main))], axis=1)
+        return self.D.plus(-self.b / self.a, self.K)
 
     @property
     def norm(self) -> float:
-        return max(abs(self.a) + abs(self.b), self.K.norm + self.D.norm)
+        return max(abs(self.a) + abs(self.b), float(self.K.norm + self.D.norm))

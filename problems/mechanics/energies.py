@@ -17,6 +17,7 @@ from typing import Any
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.mechanics.isotropic_functions import isochoric_powers
 from gradient_routes.problems.mechanics.materials import ALPHA
+from gradient_routes.problems.mechanics.polar import distance
 
 
 def without_linear_part(f: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -120,3 +121,12 @@ def linear(H: Any, q: Any) -> Any:
     mu, lam = q
     eps = (H + H.T) / 2.0
     return mu * (eps * eps).sum() + lam / 2.0 * jnp.trace(eps) ** 2
+
+
+def arap(H: Any, q: Any) -> Any:
+    """W = mu |F - R|^2 + lam/2 (J - 1)^2, R the rotation of F, q = (mu, lam) [Pa] (Bouaziz et al. 2014, sec. 5.1).
+
+    As rigid as possible, with the moduli of linear elasticity at small strain.
+    """
+    mu, lam = q
+    return mu * distance(H) + lam / 2.0 * kinematics(H)[0] ** 2

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.errors import InputError
+from gradient_routes.problems.mechanics.arap_numpy import ARAP
 from gradient_routes.problems.mechanics.materials_numpy import MOONEY_RIVLIN, NEO_HOOKEAN, NumpyMaterial
 
 Energy = Callable[[Any, Any], Any]
@@ -140,5 +141,6 @@ LAWS: dict[str, MaterialLaw] = {
             lambda q, nu: of_shear(bulk, sum(m * a for m, a in zip(q, ALPHA, strict=True)) / 2.0, nu),
         ),
         MaterialLaw("linear", ("mu", "lam"), (True, False), lame, lambda q, nu: of_shear(second_lame, q[0], nu)),
+        MaterialLaw("arap", ("mu", "lam"), (True, False), lame, lambda q, nu: of_shear(second_lame, q[0], nu), ARAP),
     )
 }

@@ -103,7 +103,7 @@ class Solid(Problem):
         return not told and o.unknown in FITTED and (o.load != "displacement" or loading.forces is not None)
 
     def _prior(self, alpha: float) -> Prior:
-        theta = self._theta(self.parameters.start)
+        theta = self.theta(self.parameters.start)
         return prior_of(alpha, SimpleNamespace(**self._options), self.solid, self.parameters, theta)
 
     # --- the problem contract
@@ -123,9 +123,9 @@ class Solid(Problem):
     def objective(self, u: Any, p: Any, xp: Any = np) -> Any:
         """J = 1/2 sum over load cases of |S u - d|^2, and alpha Phi [m^2]."""
         J = self.data.misfit(u, p, xp)
-        return J + self.regularization.value(xp, self._theta(p, xp)) if self.alpha else J
+        return J + self.regularization.value(xp, self.theta(p, xp)) if self.alpha else J
 
-    def _theta(self, p: Any, xp: Any = np) -> Any:
+    def theta(self, p: Any, xp: Any = np) -> Any:
         """The regularized quantity: log E or log t of fields, else p."""
         return p if self.log or self.solid.design.field is None else xp.log(p)
 
@@ -136,7 +136,7 @@ class Solid(Problem):
         return self.data.candidates()
 
     def prior(self, p: Array) -> tuple[Prior, Array, Array]:
-        theta = self._theta(p)
+        theta = self.theta(p)
         return self.regularization, theta, np.ones_like(p) if theta is p else 1.0 / p
 
     def linearize(self, u: Array, p: Array) -> Linearization:
@@ -268,5 +268,7 @@ def _by_hand(o: SimpleNamespace, law: MaterialLaw, who: str) -> bool:
     exist = law.numpy is not None and o.unknown in MATERIAL and o.load != "follower"
     use_numpy = exist if o.derivatives is None else o.derivatives == "hand"
     if use_numpy and law.numpy is None:
-        raise InputError(f"{who}: derivatives=hand exist for neo-hookean and mooney-rivlin, not {o.law} - take ad")
+        raise InputError(
+            f"{who}: derivatives=hand exist for neo-hookean, mooney-rivlin and arap, not {o.law} - take ad"
+        )
     return use_numpy

@@ -17,13 +17,13 @@ from gradient_routes.problems.mechanics.loaded_solid import Load
 MAX_COUNT = 10**7  # of cells, markers, layers
 LENGTHS = 1e-9, 1e9  # [m]
 
-LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear"]
+LawName = Literal["neo-hookean", "mooney-rivlin", "yeoh", "ogden", "linear", "arap"]
 Kind = Literal["plane-stress", "plane-strain", "axisymmetric"]
 Count = Annotated[int, "cells along every edge"]
 Along = Annotated[int | None, "cells along this axis [n]"]
 MeshUnit = Annotated[Literal["m", "mm", "um"], "of the mesh file; all the rest is in SI"]
 Fixed = Annotated[str | None, "components held besides, such as x@left,y@bottom: rollers, planes of symmetry"]
-Law = Annotated[LawName, "stored energy"]
+Law = Annotated[LawName, "stored energy; arap: as rigid as possible"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
 Constants = Annotated[
     str | None,

@@ -13,13 +13,13 @@ import numpy as np
 from gradient_routes.problems.errors import SingularMatrix
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.sparse import BlockDiagonal
-from gradient_routes.problems.matrices.step_matrix import StepMatrix
+from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.matrices.tridiagonal import BorderedTridiagonal, Tridiagonal
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.recurrence import RecurrenceFactorization
 from gradient_routes.routes.solvers.registry import DEFAULT, linear_solver
 from gradient_routes.routes.solvers.solver import Factorization
-from gradient_routes.routes.solvers.step_factorization import StepFactorization
+from gradient_routes.routes.solvers.step_factorization import BandedFactorization, StepFactorization
 from gradient_routes.routes.solvers.superlu import SparseFactorization
 from gradient_routes.routes.solvers.tridiagonal import BorderedFactorization, TridiagonalFactorization
 
@@ -41,7 +41,9 @@ class Factorizer:
         if isinstance(A, Recurrence):
             return RecurrenceFactorization(A, lambda block: self(block, who), who)
         if isinstance(A, StepMatrix):
-            return StepFactorization(A, who) if len(A.K.main) > 2 else DenseFactorization(A.dense, who)
+            return StepFactorization(A, lambda block: self(block, who))
+        if isinstance(A, Banded):
+            return BandedFactorization(A, who) if len(A.main) > 2 else DenseFactorization(A.dense, who)
         if self.solver.takes(A):
             return self._factorize(A, who)
         if isinstance(A, Tridiagonal):

@@ -9,10 +9,9 @@ import numpy as np
 
 from gradient_routes.problems.errors import Overflow
 from gradient_routes.problems.matrices.recurrence import Recurrence
-from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization
-from gradient_routes.routes.solvers.step_factorization import StepFactorization
+from gradient_routes.routes.solvers.step_factorization import BandedFactorization, StepFactorization
 from gradient_routes.routes.solvers.step_march import StepMarch
 
 
@@ -27,8 +26,10 @@ class RecurrenceFactorization(Factorization):
         self._blocks = [factorize(block) for block in A.A]
         self.name = f"{self._blocks[0].name}, step by step"
         self._steps: StepMarch | None = None
-        if len(A.A) < A.steps and isinstance(A.A[0], StepMatrix) and isinstance(self._blocks[0], StepFactorization):
-            self._steps = StepMarch(A.A[0], A.B[0], self._blocks[0].lu)
+        first = self._blocks[0]
+        schur = first.schur if isinstance(first, StepFactorization) else None
+        if len(A.A) < A.steps and isinstance(schur, BandedFactorization):
+            self._steps = StepMarch(A.A[0], A.B[0], schur.lu)
 
     @property
     def nbytes(self) -> int:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix, combined
+from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.problem import Array
 
 
@@ -29,8 +29,8 @@ class StepMarch:
         gttrs: Any = get_lapack_funcs(("gttrs",), lu[:4])
         gbmv: Any = get_blas_funcs(("gbmv",), lu[:4])
         self._gttrs, self._gbmv = gttrs[0], gbmv[0]
-        self.by_u = stored(combined(B.K, -B.a / A.a, A.K))
-        self.by_v = stored(combined(B.D, -B.b / A.a, A.K))
+        self.by_u = stored(B.K.plus(-B.a / A.a, A.K))
+        self.by_v = stored(B.D.plus(-B.b / A.a, A.K))
         self.K_T, self.K_before_T, self.D_before_T = stored(A.K.T), stored(B.K.T), stored(B.D.T)
 
     def _add(self, factor: float, y: Array, M: Array, x: Array) -> Array:

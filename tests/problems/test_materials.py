@@ -266,6 +266,7 @@ STRESS = {
     "yeoh": yeoh_stress,
     "ogden": ogden_stress,
     "linear": linear_stress,
+    "arap": lambda s, t, mu, lam: 2.0 * mu * (s - 1.0) + lam * (s * t * t - 1.0) * t * t,
 }
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 from gradient_routes.bench.cases.case import RouteSpec
 from gradient_routes.bench.studies.kink.ray import Ray
+from gradient_routes.problems.transient import ActiveSteps
 
 Side = Literal["left", "right"]
 NOTHING = 1e-13  # of the terms of a slope: its rounding
@@ -86,7 +87,7 @@ class Event:
     @property
     def says(self) -> str:
         where = "" if self.left.tip is None else f" (E = s E_hat), the tip at {self.left.tip:.6g} m"
-        sets = f"at s = {self.s:.10g}{where}, {self.left.active_set} becomes {self.right.active_set}"
+        sets = f"at s = {self.s:.10g}{where}, {self._change}"
         if self.slope_left is None or self.slope_right is None:
             return f"{sets}; dJ/ds is not known on both sides"
         left, right, jump = (
@@ -94,6 +95,16 @@ class Event:
             for slope in (self.slope_left, self.slope_right, self.slope_right - self.slope_left)
         )
         return f"{sets}: dJ/ds = {left} from the left, {right} from the right, a jump of {jump}"
+
+    @property
+    def _change(self) -> str:
+        left, right = self.left.active_set, self.right.active_set
+        if not (isinstance(left, ActiveSteps) and isinstance(right, ActiveSteps)):
+            return f"{left} becomes {right}"
+        flipped = left.flips(right)
+        first = flipped[0]
+        steps = f"step {first}" if len(flipped) == 1 else f"{len(flipped)} steps of {len(left)}, {first} first,"
+        return f"the active set of {steps} flips from {left[first - 1]} to {right[first - 1]}"
 
 
 def in_words(slope: float, size: float) -> str:

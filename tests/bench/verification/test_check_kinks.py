@@ -8,6 +8,7 @@ from objectives import J, P, dJ
 
 from gradient_routes import check
 from gradient_routes.problems.problem import Array
+from gradient_routes.problems.transient import ActiveSteps
 
 
 def kinked(p: Array) -> float:
@@ -30,6 +31,19 @@ def test_a_kink_nearby_is_none_at_p(distance: float) -> None:
     p = np.array([1.0, distance, 2.0])
     assert check(kinked, kinked_gradient, p, scale=np.ones(3)).verdict == "agrees"
     assert check(kinked, lambda p: 1.1 * kinked_gradient(p), p, scale=np.ones(3)).verdict == "wrong-gradient"
+
+
+def test_a_kink_of_a_march_is_told_by_the_steps_that_flip() -> None:
+    """Of 4: the second at the kink, the third a little beyond it, the others never."""
+
+    def steps(p: Array) -> ActiveSteps:
+        return ActiveSteps(["open", "1,2" if p[1] > 0.0 else "open", "1" if p[1] > 1e-9 else "open", "open"])
+
+    found = check(kinked, kinked_gradient, np.array([1.0, 0.0, 2.0]), scale=np.ones(3), active_set=steps)
+    assert found.verdict == "non-smooth"
+    assert "; the active set of 2 steps flips inside the stencil of step" in found.says
+    assert found.as_dict()["active_set_changes"] == 2
+    assert str(steps(np.ones(2))) == "open to 1, 1,2 to 2, 1 to 3, open to 4"
 
 
 def test_the_textbook_kink() -> None:

@@ -45,7 +45,7 @@ def test_active_sets_are_counted_inside_the_stencil() -> None:
     steps = subject(lambda p: float(p @ p), lambda p: 2.0 * p, [1.0], active_set=lambda p: p[0] > 1.5)
     changes = stencil_changes(steps, np.ones(1))
     assert changes is not None
-    assert [changes(h) for h in (0.25, 0.4, 0.6, 4.0)] == [0, 0, 1, 1]
+    assert [changes(h).count for h in (0.25, 0.4, 0.6, 4.0)] == [0, 0, 1, 1]
 
 
 def read(says: str, whole: bool = True, **more: Any) -> Any:
