@@ -17,6 +17,7 @@ FEW_PAIRS = 3  # of which pairs are listed
 RANK = 1e-9  # of the largest singular value: what data see less of, they do not see, for solves are no better
 SEEN = 1e-6  # of a gradient that may lie in a blind direction
 STEP = 1e-30  # of complex steps
+FAR = 2.0  # natural changes: one Gauss-Newton step that goes on is no estimate
 LOCKS = 0.49  # nu above which elements for displacements alone are too stiff
 
 
@@ -138,5 +139,8 @@ def _thirds(problem: Problem, p: Array, H: Array, scale: Array, seen: Observatio
             A, b = A - Q @ (Q.T @ A), b - Q @ (Q.T @ b)
         if len(b) <= len(p) or np.linalg.matrix_rank(A) < len(p):
             return {}
-        found.append(problem.stated(p + scale * np.linalg.lstsq(A, b, rcond=None)[0]))
+        step = np.linalg.lstsq(A, b, rcond=None)[0]
+        if np.abs(step).max() > FAR:
+            return {}
+        found.append(problem.stated(p + scale * step))
     return {name: tuple(float(of[name]) for of in found) for name in found[0]}

@@ -71,7 +71,7 @@ class Solid(Problem):
         found = read_file(mesh, o, self.noise, supports.known) if self.measured else None
         if found is not None:
             loading = loading.of_file(o, supports, found.loads, self.name)
-        self.constants = None if o.constants is None else Constants.parse(o.constants, law, self.name)
+        self.constants = Constants.of(o.constants, law, self.name) if o.unknown == "constants" else None
 
         base = base_of(o, mesh, law, loading, self.measured)
         bc = supports.boundary_conditions(mesh, loading.directions, () if found is None else found.boundary)
@@ -194,20 +194,26 @@ class Solid(Problem):
         return other
 
     def completed(self, given: Mapping[str, float]) -> Array | None:
-        """Constants of the law by name, of a material of constant volume: the last of them is told by nu.
+        """Constants [Pa] of the law by name; of a material of constant volume without the last, which nu tells.
 
         Raises InputError for nu that is far from constant volume.
         """
-        law, nu = self.solid.law, self._options["nu"]
-        if self._options["unknown"] != "constants" or set(given) != set(law.constants[:-1]):
+        law, nu, constants = self.solid.law, self._options["nu"], self.constants
+        if (
+            constants is None
+            or self.solid.springs is not None
+            or set(given) not in ({*law.constants}, {*law.constants[:-1]})
+        ):
             return None
-        if nu < NEARLY_CONSTANT_VOLUME:
-            raise InputError(
-                f"{self.name}: the constants {', '.join(given)} are of a material of constant volume, beside nu={nu:g}"
-                f" - set nu={NEARLY_CONSTANT_VOLUME:g} or more, it tells {law.constants[-1]}"
-            )
-        q = [given[name] for name in law.constants[:-1]]
-        return np.array([*q, law.of_volume(q, nu)])
+        q = [given[name] for name in law.constants if name in given]
+        if len(q) < len(law.constants):
+            if nu < NEARLY_CONSTANT_VOLUME:
+                raise InputError(
+                    f"{self.name}: the constants {', '.join(given)} are of a material of constant volume, beside"
+                    f" nu={nu:g} - set nu={NEARLY_CONSTANT_VOLUME:g} or more, it tells {law.constants[-1]}"
+                )
+            q.append(law.of_volume(q, nu))
+        return constants.of_law(q)
 
     @property
     def _is_log(self) -> bool:
@@ -217,12 +223,7 @@ class Solid(Problem):
     def stated(self, p: Array) -> dict[str, Any]:
         """Constants as people state them, E and nu besides, of laws that have them; the stiffness of springs."""
         k = {} if self.solid.springs is None else {"k [Pa/m]": self.solid.springs.k(p)}
-        if self.constants is not None and self.constants.paired:
-            return self.constants.stated(p[:2]) | k
-        if self._options["unknown"] != "constants" or self.solid.law.constants != ("mu", "lam"):
-            return k
-        mu, lam = p[:2]
-        return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)} | k
+        return (self.constants.stated(p[:2]) if self.constants is not None and self.constants.paired else {}) | k
 
     def ends(self, p: Array) -> list[End]:
         return self.constants.ends(p[:2]) if self.constants is not None and self.constants.paired else []

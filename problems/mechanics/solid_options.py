@@ -27,7 +27,7 @@ Law = Annotated[LawName, "stored energy"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
 Constants = Annotated[
     str | None,
-    "that are unknown: E,nu mu,lam K,G C10,C01,c .., with starts as in E:200GPa,nu:0.3 [mu,lam, untransformed]",
+    "that are unknown: E,nu mu,lam K,G C10,C01,c .., with starts as in E:200GPa,nu:0.3 [mu,lam, or the law's]",
 ]
 Modulus = Annotated[float | None, "Young's, to start from or known [1; fitted to a file's data]"]
 Derivatives = Annotated[

@@ -179,6 +179,8 @@ def test_a_constant_at_its_bound_has_no_bar_and_the_other_one_has_with_it_held(c
     assert found["E [Pa]"]["sd"] == pytest.approx(sd, rel=1e-5)
     ran = cli("invert", "--problem", f"{PATCH},constants=E,nu]", "--no-store", "--no-plot")
     assert "nu is at its bound, 0.5: dJ/dnu < 0, the data want it beyond; error bars of the others are" in ran.out
+    ran = cli("invert", "--problem", f"{PATCH}]", "--no-store", "--no-plot")  # mu, lam: never past it
+    assert "lam is at its bound, infinity: dJ/dlam < 0, the data want it beyond" in ran.out
 
 
 def test_a_blind_direction_is_named_and_gets_no_bar(cli, tmp_path) -> None:
