@@ -181,8 +181,8 @@ def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = T
     """What the problem shows beside the gradient at the end (for the bar, its strains) and the blind parameters.
 
     A route that returns no state, such as finite differences, costs one forward solve here, and a problem that does
-    not know its blind parameters one forward and one adjoint solve; none of them is counted. Without `complete` only
-    what needs no solve is shown.
+    not know its blind parameters one factorization and one adjoint solve; none of them is counted. Without `complete`
+    only what needs no solve is shown.
     """
     if Offers.SOLVE not in problem.offers or (found.u is None and not complete):
         return ParameterView()
@@ -196,6 +196,6 @@ def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = T
     if shown.blind is not None or not complete or seen is None or not len(seen.data):
         return shown
     try:
-        return replace(shown, blind=Sensitivity(model, model.solve(found.p)).blind())
+        return replace(shown, blind=Sensitivity(model, model.state_at(u, found.p)).blind())
     except OUTSIDE:
         return shown
