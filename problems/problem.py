@@ -340,6 +340,12 @@ class Problem:
         """This problem, its data and its mesh, from a start that is `factor` times as stiff."""
         raise NotOffered(f"{self.name}: its start has no stiffness to multiply")
 
+    def told_by_data(self, p: Array) -> tuple[Problem, float] | None:
+        """This problem from a start that its data tell, and by what factor, at least 1, p is off; None where they tell
+        none.
+        """
+        return None
+
     def stated(self, p: Array) -> Mapping[str, Any]:
         """What p means in constants that people state, such as E and nu, by name with the unit; holomorphic."""
         return {}

@@ -150,7 +150,12 @@ def invert(
 
 
 def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Problem, Array, str | None]:
-    """The problem and p from a stiffness that the data fit best, where p is more than a decade off; and what to say."""
+    """The problem and p from a start that fits the data best, where p is more than a decade off; and what to say."""
+    told = problem.told_by_data(p)
+    if told is not None:
+        other, off = told
+        says = f"the start is what the data tell: the one given is off by a factor of {off:.3g}"
+        return (problem, p, None) if off <= FAR else (other, other.parameters.start, says)
     model = Model(problem, solver)
     if Offers.SOLVE not in problem.offers or problem.scaled(p, 1.0) is None:
         return problem, p, None
