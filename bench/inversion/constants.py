@@ -11,10 +11,9 @@ from gradient_routes.bench.inversion.objective import Evaluation
 from gradient_routes.bench.inversion.residuals import inliers
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.problem import Array, End, Problem
+from gradient_routes.routes.sensitivity import FEW, RANK
 
-FEW = 6  # parameters of which correlations are shown
 FEW_PAIRS = 3  # of which pairs are listed
-RANK = 1e-9  # of the largest singular value: what data see less of, they do not see, for solves are no better
 SEEN = 1e-6  # of a gradient that may lie in a blind direction
 STEP = 1e-30  # of complex steps
 FAR = 2.0  # natural changes: one Gauss-Newton step that goes on is no estimate

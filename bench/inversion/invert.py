@@ -186,8 +186,8 @@ def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = T
     """What the problem shows beside the gradient at the end (for the bar, its strains) and the blind parameters.
 
     A route that returns no state, such as finite differences, costs one forward solve here, and a problem that does
-    not know its blind parameters one factorization and one adjoint solve; none of them is counted. Without `complete`
-    only what needs no solve is shown.
+    not know its blind parameters one factorization and few linearized solves; none of them is counted. Without
+    `complete` only what needs no solve is shown.
     """
     if Offers.SOLVE not in problem.offers or (found.u is None and not complete):
         return ParameterView()
@@ -201,6 +201,7 @@ def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = T
     if shown.blind is not None or not complete or seen is None or not len(seen.data):
         return shown
     try:
-        return replace(shown, blind=Sensitivity(model, model.state_at(u, found.p)).blind())
+        natural = problem.parameters.natural(found.p)
+        return replace(shown, blind=Sensitivity(model, model.state_at(u, found.p), natural).blind())
     except OUTSIDE:
         return shown

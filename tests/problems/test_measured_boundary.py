@@ -11,7 +11,9 @@ import pytest
 from conftest import relative_error
 from test_plate import complex_gradient
 
+from gradient_routes.bench.cases.case import problems, routes
 from gradient_routes.bench.inversion.fit import fit
+from gradient_routes.bench.inversion.invert import Engine, invert
 from gradient_routes.bench.inversion.objective import Evaluation
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.data.boundary_values import BoundaryValues
@@ -181,6 +183,19 @@ def test_without_a_force_what_is_not_told_is_said(tmp_path: Path) -> None:
     plate = Plate(**GRIP, data=strip_data(tmp_path))
     assert "displacements alone tell ratios of moduli; their size stays that of the start: give force=" in plate.notes
     assert (plate.start_from_data, plate.scaled(plate.parameters.start, 2.0)) == (False, None)
+
+
+@pytest.mark.parametrize("optimizer", ["gauss-newton", "levenberg-marquardt"])
+def test_what_displacements_do_not_tell_stays_at_its_start_and_is_marked(optimizer: Any, tmp_path: Path) -> None:
+    """Rounding, 1e-16 of the slope by nu, had moved E by decades."""
+    data = strip_data(tmp_path, noise=1e-6)
+    plate = Plate(**GRIP | {"derivatives": "hand"}, constants="E,nu", modulus=2.0, data=data)
+    spec, route = problems(["plate[derivatives=hand]"])[0], routes(["adjoint"])[0]
+    ended = invert(spec, route, Engine(optimizer), made=plate)
+    assert ended.end.startswith("converged")
+    assert ended.p[0] == pytest.approx(np.log(2.0), abs=1e-12)
+    assert plate.stated(ended.p)["nu"] == pytest.approx(NU, abs=0.1)
+    assert ended.view.blind.tolist() == [True, False]
 
 
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
