@@ -46,6 +46,11 @@ def forces(o: SimpleNamespace, loads: LoadCases | None, who: str) -> Array | Non
     """The force [N] in every load case where grips are at known displacements, None where none is given."""
     if loads is None:
         return None if o.force is None else np.array([o.force])
+    if loads.values.ndim == 2 and o.boundary == "measured":
+        raise InputError(
+            f"{who}: with boundary=measured, load=displacement columns load_x.. of {o.data} are no datum - give the"
+            " force along direction= as a column load"
+        )
     if o.boundary == "measured":
         if loads.kind == "force":
             if o.force is not None:
