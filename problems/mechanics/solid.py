@@ -159,7 +159,8 @@ class Solid(Problem):
         if o["mesh"] is not None or unknown in ("traction", "shape"):
             return None
         doubled = {name: 2 * (o[name] or o["n"]) for name in ("nx", "ny", "nz") if name in o}
-        layers = len(p) - (self.solid.springs is not None) if unknown == "layers" else None
+        springs = self.solid.springs
+        layers = len(p) - (0 if springs is None else springs.count) if unknown == "layers" else None
         finer = type(self)(**o | doubled | {"n": 2 * o["n"], "layers": layers})
         if unknown not in ("modulus", "thickness"):
             return finer, p
@@ -178,7 +179,8 @@ class Solid(Problem):
             return np.asarray(p + np.log(factor) * self.solid.design.by_stiffness)
         q = p + np.log(factor) if self._is_log else factor * p
         if self.solid.springs is not None and self.log:
-            q[-1] = p[-1] + np.log(factor)
+            of_k = slice(-self.solid.springs.count, None)
+            q[of_k] = p[of_k] + np.log(factor)
         return q
 
     def stiffened(self, factor: float) -> Solid:
@@ -188,7 +190,7 @@ class Solid(Problem):
         other = copy.copy(self)
         scale = self.parameters.scale * (1.0 if self._is_log else factor)
         if self.solid.springs is not None and self.log:
-            scale[-1] = 1.0
+            scale[-self.solid.springs.count :] = 1.0
         other.parameters = replace(self.parameters, start=start, scale=scale)
         other.regularization = other._prior(self.alpha)
         return other
@@ -222,7 +224,7 @@ class Solid(Problem):
 
     def stated(self, p: Array) -> dict[str, Any]:
         """Constants as people state them, E and nu besides, of laws that have them; the stiffness of springs."""
-        k = {} if self.solid.springs is None else {"k [Pa/m]": self.solid.springs.k(p)}
+        k = {} if self.solid.springs is None else self.solid.springs.stated(p)
         return (self.constants.stated(p[:2]) if self.constants is not None and self.constants.paired else {}) | k
 
     def ends(self, p: Array) -> list[End]:
