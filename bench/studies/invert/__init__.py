@@ -30,8 +30,9 @@ FRAMES = (
     "Readings to apply it to, a row a frame: CSV with columns of their names, or .npz with one array in their order."
 )
 OUTPUT = (
-    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; FILE.vtu: u and p on the mesh. With"
-    f" --linear p of every frame as CSV, and FILE.npz, the map. {replaces('file of its kind')}"
+    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; FILE.vtu: u and p on the mesh,"
+    " residuals at the data. With --linear p of every frame as CSV, and FILE.npz, the map."
+    f" {replaces('file of its kind')}"
 )
 RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import meshio
 import numpy as np
 import pytest
 
@@ -166,6 +167,20 @@ def test_constants_of_every_choice_are_the_same_with_the_same_bars(cli, tmp_path
     assert [one["E [Pa]"]["sd"], one["nu"]["sd"]] == pytest.approx(np.sqrt(np.diag(C)), rel=1e-6)
     assert one["E [Pa]"]["correlations"]["nu"] == pytest.approx(C[0, 1] / np.sqrt(C[0, 0] * C[1, 1]), rel=1e-6)
     assert other["K [Pa]"]["value"] == pytest.approx(E / 3 / (1 - 2 * nu), rel=1e-5)
+
+
+def test_residuals_are_fields_on_the_points_of_the_data(cli, tmp_path) -> None:
+    (tmp_path / "d.csv").write_text(patch(0.25, "ux,uy"))
+    files = ("-o", str(tmp_path / "p.vtu"), "--no-store", "--json")
+    ran = cli("invert", "--problem", f"{PATCH},constants=E,nu]", "--optimizer", "gauss-newton", *files)
+    rows = [row for row in ran.rows if row["table"] == "residuals" and row["quantity"] == "uy"]
+    grid = meshio.read(tmp_path / "p.vtu")
+    at = grid.cells_dict["vertex"].ravel()
+    known = {(x, y): r for (x, y, _), r in zip(grid.points[at], grid.point_data["residual_uy"][at], strict=True)}
+    assert len(rows) == len(known) == 16
+    assert all(known[row["x"], row["y"]] == pytest.approx(row["residual"], abs=1e-18) for row in rows)
+    assert np.isnan(grid.point_data["residual_over_noise_ux"][: at[0]]).all()
+    assert np.isnan(grid.point_data["u"][at]).all()
 
 
 def test_a_constant_at_its_bound_has_no_bar_and_the_other_one_has_with_it_held(cli, tmp_path) -> None:
