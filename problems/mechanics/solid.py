@@ -17,6 +17,7 @@ from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
+from gradient_routes.problems.mechanics.boundary_noise import boundary_noise
 from gradient_routes.problems.mechanics.chosen_design import base_of, design_of
 from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.design_variables import FITTED, MATERIAL
@@ -32,6 +33,7 @@ from gradient_routes.problems.problem import (
     End,
     Fields,
     Linearization,
+    Nuisance,
     Offers,
     Operator,
     ParameterView,
@@ -74,7 +76,8 @@ class Solid(Problem):
         self.constants = Constants.of(o.constants, law, self.name) if o.unknown == "constants" else None
 
         base = base_of(o, mesh, law, loading, self.measured)
-        bc = supports.boundary_conditions(mesh, loading.directions, () if found is None else found.boundary)
+        self.boundary = () if found is None else found.boundary
+        bc = supports.boundary_conditions(mesh, loading.directions, self.boundary)
         design = design_of(o, self.log, mesh, law, base, supports, loading, self.constants)
         on, along, springs = supports.loaded, loading.directions, supports.springs
         self.solid = LoadedSolid(mesh, law, bc, on, o.load, along, design, base, springs, use_numpy)
@@ -131,6 +134,10 @@ class Solid(Problem):
 
     def observation(self, u: Array, p: Array) -> Observation:
         return self.data.observation(u, p)
+
+    def taken_as_exact(self, u: Array, p: Array) -> Nuisance | None:
+        """Measured displacements of the boundary."""
+        return boundary_noise(self.data, self.boundary, u, p)
 
     def candidates(self) -> Candidates:
         return self.data.candidates()
