@@ -27,7 +27,7 @@ $(READY): pyproject.toml constraints.txt
 demo: $(READY) ## install into .venv, then all seven routes on the bar
 	$(BIN)/routes run --problem bar --route all
 
-STEEL = plate[body=hole,nx=16,ny=4,size=0.08,0.02,radius=0.004,element=quad8,law=linear,unknown=constants,clamped=left,loaded=right,direction=normal,traction=106.2629e6,data=examples/measured/steel_plate.csv,noise=0.4um
+STEEL = plate[body=hole,nx=16,ny=4,size=0.08,0.02,radius=0.004,element=quad8,law=linear,unknown=constants,constants=E,nu,clamped=left,loaded=right,direction=normal,traction=106.2629e6,data=examples/measured/steel_plate.csv,noise=0.4um
 
 RUBBER = data=examples/measured/rubber.csv,noise=5kPa
 ROD = rod[data=examples/measured/cooled_rod.csv,length=400mm,diameter=12mm,conductivity=110,base=85degC,ambient=21.5degC,noise=0.1K

@@ -202,7 +202,8 @@ class ImpactBlock(Transient):
     def rates(self, t_0: int, states: Array, p: Array) -> Rates:
         J, J_u = self.histories.step_misfits(t_0, states[1:])
         f_p = [self.solid.R_p(u, p) for u in states[:, : self.n]]
-        return Rates(J, ImpulsesByMaterial(f_p, self.h), J_u, np.zeros((len(J), len(p))))
+        R_p = ImpulsesByMaterial(f_p, self.h)
+        return Rates(J, J_u, np.zeros((len(J), len(p))), R_p.each_transposed, R_p)
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.body.theta(p, xp)) if self.alpha else 0.0
@@ -252,12 +253,13 @@ class ImpactBlock(Transient):
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
         rates = self.rates(t - 1, np.stack([v, u]), p)
+        assert rates.R_p is not None
         return Linearization(rates.R_p, rates.J_u[0], rates.J_p[0])
 
-    def step_initial(self, t: int, v: Array, p: Array) -> Array:
+    def step_initial(self, t: Any, v: Any, p: Any, xp: Any = np) -> Any:
         """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
         x, velocity = v.reshape(2, -1)
-        return np.concatenate([x + self.h * velocity, velocity])
+        return xp.concatenate([x + self.h * velocity, velocity])
 
     def step_active_set(self, t: int, u: Array, p: Array) -> Hashable | None:
         return self.plane.active_set(u[: self.n])

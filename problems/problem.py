@@ -89,6 +89,14 @@ class Operator(Protocol):
     def __matmul__(self, v: Any, /) -> Any: ...
 
 
+class Nuisance(Protocol):
+    """Independent unit normal variables b (k,) that R and S depend on besides."""
+
+    def pulled(self, w: Array, lam: Array) -> Array:
+        """d(w . S u)/db (k,) through u as well, for w (m,) and R_u^T lam = S_u^T w."""
+        ...
+
+
 def default_label(i: int) -> str:
     return f"p_{i + 1}"
 
@@ -340,6 +348,12 @@ class Problem:
         """This problem, its data and its mesh, from a start that is `factor` times as stiff."""
         raise NotOffered(f"{self.name}: its start has no stiffness to multiply")
 
+    def told_by_data(self, p: Array) -> tuple[Problem, float] | None:
+        """This problem from a start that its data tell, and by what factor, at least 1, p is off; None where they tell
+        none.
+        """
+        return None
+
     def stated(self, p: Array) -> Mapping[str, Any]:
         """What p means in constants that people state, such as E and nu, by name with the unit; holomorphic."""
         return {}
@@ -347,6 +361,10 @@ class Problem:
     def ends(self, p: Array) -> list[End]:
         """What p states that is at an end of its domain."""
         return []
+
+    def taken_as_exact(self, u: Array, p: Array) -> Nuisance | None:
+        """What R takes as exact at a solved state and is known with noise, beside the data; None where nothing is."""
+        return None
 
     def candidates(self) -> Candidates | None:
         """What sensors can read; None: any unknown of the state."""

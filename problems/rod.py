@@ -112,7 +112,6 @@ class Rod(Problem):
             x = self._read(data)
             if all(given[name] is None for name in names) and not self.fin.behind.size:
                 self.sizes = self.fin.sizes(names, self.sizes, x, self._data())
-            self.fin.check_reach(self.sizes, float(x.min()))
         self.sensors = Line.through(x, self.fin.L, n)
         self.part = np.arange(n) * parts // n  # (N,) of every element
         each = {"film": Parts.line(parts), "conductivity": Parts.line(parts), "flux": Parts.point()}
@@ -245,6 +244,19 @@ class Rod(Problem):
             )
         return self.d
 
+    def told_by_data(self, p: Array) -> tuple[Rod, float] | None:
+        """The closed form that fits them best."""
+        if not self.measured or self.fin.behind.size:
+            return None
+        each, given = self.unknowns.each, self._given
+        sizes = self.fin.sizes([c.name for c in each], self.sizes, self.sensors.x, self._data())
+        other = copy.copy(self)
+        log = given["parametrization"] == "log"
+        other.sizes, other.unknowns = sizes, Unknowns.of([c.name for c in each], sizes, given["parts"], log)
+        other.parameters = other.unknowns.parameters(self.fin.L)
+        ratios = [float(np.mean(c.value(p))) / sizes[c.name] for c in each]
+        return other, max(max(r, 1.0 / r) if r > 0.0 else math.inf for r in ratios)
+
     def truth(self) -> Array | None:
         return self.unknowns.truth if self._given["data"] is None else None
 
@@ -267,6 +279,8 @@ class Rod(Problem):
         if error > COARSE:
             wanted = math.ceil(self.n * math.sqrt(error / COARSE))
             notes.append(f"{self.n} elements are coarse for this loss: temperatures err by {error:.1%} - n={wanted}")
+        if not self.fin.reaches(self.sizes, float(self.sensors.x.min())):
+            notes.append("no heat reaches the first thermocouple at this start: dJ/dp is 0 there, but at no minimum")
         if names == {"film", "conductivity"} and not self.heated:
             notes.append("without a flux, temperatures depend on film / conductivity alone: give flux=, or seek one")
         if self.d is not None and not self.heated:

@@ -13,6 +13,9 @@ from gradient_routes.routes.linearized_solve import LinearizedSolver, state_deri
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import State
 
+FEW = 6  # parameters, for which a whole H costs little
+RANK = 1e-9  # of what data see most: what they see less of, they do not see, for solves are no better
+
 
 class Sensitivity:
     """H = d(S u)/dp diag(scale) at a solved state, (m, n_p); one solve with R_u or its transpose a product.
@@ -56,7 +59,12 @@ class Sensitivity:
         return np.asarray(H_v if self.seen.S_p is None else H_v + self.seen.S_p @ dp)
 
     def blind(self, seed: int = 0) -> Array:
-        """Parameters that no datum depends on, (n_p,): where a random combination of all rows of H is exactly 0."""
+        """Parameters that no datum depends on, (n_p,): where a random combination of all rows of H is exactly 0; where
+        they are FEW, also those that only rounding tells anything of.
+        """
+        if self.shape[1] <= FEW:
+            size = np.linalg.norm(self.dense(), axis=0)
+            return np.asarray(size <= RANK * size.max())
         w = np.random.default_rng(seed).standard_normal(self.shape[0])
         return np.asarray(self.T @ w == 0.0)
 

@@ -40,14 +40,17 @@ def read_point(problem: Problem, path: str) -> Array:
     other = [name for name in given if name not in wanted]
     if len(wanted) < len(q) and names == [q.label(i) for i in range(len(q))]:  # names that are not unique
         return values
+    completed = problem.completed(given) if set(given) != set(wanted) else None
+    if completed is not None:
+        converted = [name for name, unit in zip(names, units, strict=True) if unit not in ("", "Pa")]
+        if converted:
+            raise InputError(f"{path}: {converted[0]} is in {units[names.index(converted[0])]}, not in Pa - convert it")
+        return problem.parameters.check(completed, path)
     if other:
         raise InputError(f"{path}: {other[0]} is no parameter of {problem.name}: {_listed(wanted)} - choose its law")
     if len(given) < len(wanted):
-        completed = problem.completed(given)
-        if completed is None:
-            absent = [name for name in wanted if name not in given]
-            raise InputError(f"{path}: has no {_listed(absent)} of {problem.name} - give all parameters")
-        return completed
+        absent = [name for name in wanted if name not in given]
+        raise InputError(f"{path}: has no {_listed(absent)} of {problem.name} - give all parameters")
     return np.array([given[name] for name in wanted])
 
 

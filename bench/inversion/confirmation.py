@@ -16,6 +16,7 @@ LEVEL = "stopped: J is level here, p no longer matters to the data - choose anot
 SEED = 0  # of the random directions
 STEP = 1e-4  # of x along them, in natural changes: truncation is h^2, rounding of J is eps / h
 CURVED = 10.0  # J''' / J'' over a natural change, at most
+LOGARITHM = 100.0  # |x| up to which x may be one of a quantity in SI units, over which J bends as x changes by 1
 INSIDE = 0.5  # part of the way to a bound that the largest step goes at most
 WIDE = 1e-2  # of x along them, where J bends by no more than rounding over the first
 ENDLESS = 0.01  # of max(1, |x|): what a Newton step still goes where J is level rather than at a minimum
@@ -63,7 +64,7 @@ def directions(objective: Objective) -> list[Array]:
     """Two random ones: every x_i by 1/2 to 1 natural changes, less where a bound is near."""
     rng, at, q = np.random.default_rng(SEED), objective.accepted, objective.problem.parameters
     x, slope = at.x, objective.variables.slope(at.x)
-    natural = np.maximum(1.0, np.abs(x)) / size(x)  # of steps relative to the size of x
+    natural = np.maximum(1.0, np.abs(x) / LOGARITHM) / size(x)  # of steps relative to the size of x
     room = np.minimum(at.p - q.lower, q.upper - at.p)
     most = INSIDE * room / (STEPS[0] * size(x) * slope)
     found = []

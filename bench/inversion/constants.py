@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +11,14 @@ from gradient_routes.bench.inversion.objective import Evaluation
 from gradient_routes.bench.inversion.residuals import inliers
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.problem import Array, End, Problem
+from gradient_routes.routes.sensitivity import FEW, RANK
 
-FEW = 6  # parameters of which correlations are shown
 FEW_PAIRS = 3  # of which pairs are listed
-RANK = 1e-9  # of the largest singular value: what data see less of, they do not see, for solves are no better
 SEEN = 1e-6  # of a gradient that may lie in a blind direction
 STEP = 1e-30  # of complex steps
+FAR = 2.0  # natural changes: one Gauss-Newton step that goes on is no estimate
 LOCKS = 0.49  # nu above which elements for displacements alone are too stiff
+Spread = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,18 @@ class Constants:
 
 
 def stated(
-    problem: Problem, found: Evaluation, A: Array, H: Array, seen: Observation, sigma: float
+    problem: Problem,
+    found: Evaluation,
+    A: Array,
+    H: Array,
+    seen: Observation,
+    sigma: float,
+    spread: Spread | None = None,
 ) -> Constants | None:
-    """Those of the problem, else its parameters where they are FEW; A: H with the rows of the prior."""
+    """Those of the problem, else its parameters where they are FEW; A: H with the rows of the prior.
+
+    spread  from P (j, m) to a root (j, k) of what adds to the covariance of P y, beside data with the noise sigma
+    """
     p, q = found.p, problem.parameters
     values = problem.stated(p)
     if not values and len(p) > FEW:
@@ -85,13 +95,16 @@ def stated(
     rank = int(np.count_nonzero(s > RANK * s.max(initial=0.0)))
     V_seen, blind = V[:rank], V[rank:]
     g = by_x[:, free]
-    root = (g @ V_seen.T) / s[:rank] if rank else np.zeros((len(g), 0))
+    root = (sigma or 1.0) * (g @ V_seen.T) / s[:rank] if rank else np.zeros((len(g), 0))
+    if spread is not None:
+        by_data = g @ (V_seen.T / s[:rank] ** 2) @ V_seen @ A[: len(H), free].T
+        root = np.concatenate([root, spread(by_data)], axis=1)
     size, total = np.linalg.norm(root, axis=1), np.linalg.norm(g, axis=1)
     barred = (np.linalg.norm(g @ blind.T, axis=1) <= SEEN * total) & (size > 0.0)
     bounded = {end.name: end.bound for end in ends}
     gone = {*bounded, *(other for end in ends for other in end.others)}
     barred &= [name.partition(" [")[0] not in gone for name in names]
-    sd = np.where(barred & (sigma > 0.0), sigma * size, np.nan)
+    sd = np.where(barred & (sigma > 0.0), size, np.nan)
     with np.errstate(invalid="ignore"):
         correlation = np.where(np.outer(barred, barred), (root @ root.T) / np.outer(size, size), np.nan)
     remarks = [_at_bound(end, float(found.gradient[end.i])) for end in ends]
@@ -138,5 +151,8 @@ def _thirds(problem: Problem, p: Array, H: Array, scale: Array, seen: Observatio
             A, b = A - Q @ (Q.T @ A), b - Q @ (Q.T @ b)
         if len(b) <= len(p) or np.linalg.matrix_rank(A) < len(p):
             return {}
-        found.append(problem.stated(p + scale * np.linalg.lstsq(A, b, rcond=None)[0]))
+        step = np.linalg.lstsq(A, b, rcond=None)[0]
+        if np.abs(step).max() > FAR:
+            return {}
+        found.append(problem.stated(p + scale * step))
     return {name: tuple(float(of[name]) for of in found) for name in found[0]}

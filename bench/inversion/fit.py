@@ -1,7 +1,8 @@
 """How well the answer explains measured data, and how well the data determine it: residuals against noise, error bars.
 
-Error bars are those of Gauss and Newton: p +- sqrt(diag((H^T H)^{-1})) sigma at the answer, H = d(S u)/dp. They know
-noise and nothing of what is wrong with the model: where residuals exceed the noise they mean nothing.
+Error bars are those of Gauss and Newton: p +- sqrt(diag((H^T H)^{-1})) sigma at the answer, H = d(S u)/dp, and what the
+noise of measured boundary values adds to first order. They know noise and nothing of what is wrong with the model:
+where residuals exceed the noise they mean nothing.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gradient_routes.bench.inversion import posterior
-from gradient_routes.bench.inversion.constants import Constants, stated
+from gradient_routes.bench.inversion.constants import Constants, Spread, stated
 from gradient_routes.bench.inversion.objective import Evaluation, observed
 from gradient_routes.bench.inversion.residuals import Residuals
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.errors import OUTSIDE
 from gradient_routes.problems.problem import Array, Offers, Problem
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import Solver
-from gradient_routes.routes.sensitivity import Sensitivity
+from gradient_routes.routes.newton import Solver, State
+from gradient_routes.routes.sensitivity import RANK, Sensitivity
 
 MANY = 50  # parameters, each of which takes a linearized solve
 
@@ -51,21 +52,38 @@ def fit(problem: Problem, found: Evaluation, solver: Solver) -> Fit | None:
     try:
         state = model.solve(p) if found.u is None else model.state_at(found.u, p)
         seen = problem.observation(state.u, p)
-        H = Sensitivity(model, state, scale).dense() if len(p) <= MANY else None
+        by_p = Sensitivity(model, state, scale) if len(p) <= MANY else None
+        H = None if by_p is None else by_p.dense()
     except OUTSIDE:
         return None
     if seen is None or not len(seen.data):
         return None
     unloaded = observed(problem, p) if problem.drive == "load" else None
-    if H is None:
+    if H is None or by_p is None:
         residuals = Residuals.of(seen, unloaded=unloaded, prior=problem.prior(p) is not None and problem.alpha > 0.0)
         return Fit(residuals, seen, np.full(len(p), np.nan))
     prior = posterior.prior_rows(problem, p, scale)
     A = H if prior is None else np.concatenate([H, prior])
     residuals = Residuals.of(seen, fitted(H, A), unloaded, H, prior is not None)
     sigma = residuals.noise * seen.weight
+    spread = beside(problem, by_p, state, seen)
     sd = posterior.known(problem, p, H, scale, sigma).sd
-    return Fit(residuals, seen, sd, stated(problem, found, A, H, seen, sigma))
+    if spread is not None:
+        sd = np.hypot(sd, scale * np.linalg.norm(spread(np.linalg.pinv(A, rcond=RANK)[:, : len(H)]), axis=1))
+    return Fit(residuals, seen, sd, stated(problem, found, A, H, seen, sigma, spread))
+
+
+def beside(problem: Problem, by_p: Sensitivity, state: State, seen: Observation) -> Spread | None:
+    """What noise of that which R takes as exact does to estimates, by one transposed solve each; None without any."""
+    exact = problem.taken_as_exact(state.u, state.p)
+    if exact is None:
+        return None
+
+    def spread(P: Array) -> Array:
+        """(j, k), of estimates P y (j,) by independent unit normal variables, P (j, m)."""
+        return np.stack([exact.pulled(w, by_p.R_u.solve_transposed(np.asarray(seen.S_u.T @ w))) for w in P])
+
+    return spread
 
 
 def fitted(H: Array, A: Array) -> float:

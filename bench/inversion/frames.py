@@ -6,6 +6,7 @@ import csv
 import time
 import zipfile
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,32 +73,48 @@ def estimated(by: LinearMap, frames: Array) -> Estimates:
     return Estimates(by, p, np.sqrt(np.sum(r**2, axis=1) / freedom) / float(by.sigma), seconds)
 
 
-def read_frames(path: Path, by: LinearMap) -> Array:
-    """(F, m) of a file with a row a frame: .npz with one array, or CSV with a header. Columns that have the names of
-    readings are found by them, in any order; m columns with other names are taken in the order of the readings.
+def read_frames(path: Path, by: LinearMap) -> tuple[Array, str | None]:
+    """(F, m) of a file with a row a frame, CSV with columns named as the readings, in any order, or .npz with one array
+    in their order; and what to say of the latter.
 
-    Raises InputError, naming the line or the frame.
+    Raises InputError, naming the column, the line or the frame.
     """
-    frames = _from_npz(path) if path.suffix.lower() == ".npz" else _from_csv(path, by)
+    named = path.suffix.lower() != ".npz"
+    frames = _from_csv(path, by.readings.tolist()) if named else _from_npz(path)
     if frames.ndim != 2 or frames.shape[1] != len(by.readings) or not len(frames):
         raise InputError(f"--frames {path}: an array {frames.shape} - give (frames, {len(by.readings)} readings)")
     bad = np.flatnonzero(~np.isfinite(frames).all(axis=1))
     if bad.size:
         k = int(np.flatnonzero(~np.isfinite(frames[bad[0]]))[0])
         raise InputError(f"--frames {path}: frame {bad[0] + 1}, reading {by.readings[k]} is not finite - remove it")
-    return frames
+    order = f"{by.readings[0]} to {by.readings[-1]}"
+    return frames, None if named else f"--frames {path} names no columns: taken in the order of the readings, {order}"
 
 
-def _from_csv(path: Path, by: LinearMap) -> Array:
-    file, readings = NumberFile.opened(path, located("")), by.readings.tolist()
-    named = set(readings) & set(file.names) if len(set(readings)) == len(readings) else set()
-    missing = [name for name in readings if name not in named]
-    if (named and missing) or (not named and len(file.names) != len(readings)):
-        lacks = f"without {missing[0]}" if named else f"for {len(readings)} readings, {readings[0]} to {readings[-1]}"
-        raise InputError(f"--frames {path}: {len(file.names)} columns {lacks} - give one a reading, a row a frame")
-    places = [file.names.index(name) for name in readings] if named else range(len(readings))
+def _from_csv(path: Path, readings: list[str]) -> Array:
+    file = NumberFile.opened(path, located(""))
+    if list(file.names) != readings:
+        _check_names(path, file.names, readings)
+    places = range(len(readings)) if list(file.names) == readings else [file.names.index(name) for name in readings]
     values, _ = file.read(list(places))
     return np.ascontiguousarray(values.T)
+
+
+def _check_names(path: Path, columns: Sequence[str], readings: list[str]) -> None:
+    """Raises InputError unless each reading has one column of its name."""
+    remedy = "give one column a reading, named like it, or .npz without names in the order of the readings"
+    twice = next((name for name in readings if readings.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"--frames {path}: several readings are {twice}, and columns are not theirs in order - {remedy}"
+        )
+    wrong = next((name for name in readings if columns.count(name) != 1), None)
+    if wrong is None:
+        return
+    k = readings.index(wrong) + 1
+    other = next((name for name in columns if name not in readings), None)
+    has = f"the first of other names is {other}" if other is not None else f"{columns.count(wrong)} columns have it"
+    raise InputError(f"--frames {path}: reading {k} of {len(readings)} is {wrong}, {has} - {remedy}")
 
 
 def _from_npz(path: Path) -> Array:

@@ -150,7 +150,12 @@ def invert(
 
 
 def of_the_size_of_data(problem: Problem, p: Array, solver: Solver) -> tuple[Problem, Array, str | None]:
-    """The problem and p from a stiffness that the data fit best, where p is more than a decade off; and what to say."""
+    """The problem and p from a start that fits the data best, where p is more than a decade off; and what to say."""
+    told = problem.told_by_data(p)
+    if told is not None:
+        other, off = told
+        says = f"the start is what the data tell: the one given is off by a factor of {off:.3g}"
+        return (problem, p, None) if off <= FAR else (other, other.parameters.start, says)
     model = Model(problem, solver)
     if Offers.SOLVE not in problem.offers or problem.scaled(p, 1.0) is None:
         return problem, p, None
@@ -181,8 +186,8 @@ def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = T
     """What the problem shows beside the gradient at the end (for the bar, its strains) and the blind parameters.
 
     A route that returns no state, such as finite differences, costs one forward solve here, and a problem that does
-    not know its blind parameters one forward and one adjoint solve; none of them is counted. Without `complete` only
-    what needs no solve is shown.
+    not know its blind parameters one factorization and few linearized solves; none of them is counted. Without
+    `complete` only what needs no solve is shown.
     """
     if Offers.SOLVE not in problem.offers or (found.u is None and not complete):
         return ParameterView()
@@ -196,6 +201,7 @@ def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = T
     if shown.blind is not None or not complete or seen is None or not len(seen.data):
         return shown
     try:
-        return replace(shown, blind=Sensitivity(model, model.solve(found.p)).blind())
+        natural = problem.parameters.natural(found.p)
+        return replace(shown, blind=Sensitivity(model, model.state_at(u, found.p), natural).blind())
     except OUTSIDE:
         return shown

@@ -13,7 +13,7 @@ from gradient_routes.bench.inversion.optimizers import Limits, Stopped, accept, 
 from gradient_routes.problems.errors import OUTSIDE, InputError
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.newton import State
-from gradient_routes.routes.sensitivity import Sensitivity
+from gradient_routes.routes.sensitivity import FEW, RANK, Sensitivity
 
 BEYOND = 30.0  # residuals where J is not defined, in those of the last step: no trust region extends there
 LSMR = {"regularize": False, "atol": 1e-8, "btol": 1e-8}  # whole Gauss-Newton steps
@@ -102,8 +102,6 @@ class Residuals:
 
 def gauss_newton(objective: Objective, history: History, limits: Limits) -> str:
     """Gauss-Newton in a trust region, each step by products with H (LSMR): SciPy's least_squares, trf."""
-    if len(objective.accepted.x) == 1:  # its search in a plane of two directions ends in IndexError
-        return _by_least_squares(objective, history, limits, Residuals.dense, {"method": "trf", "tr_solver": "exact"})
     lsmr = {"method": "trf", "tr_solver": "lsmr", "tr_options": LSMR}
     return _by_least_squares(objective, history, limits, Residuals.derivative, lsmr)
 
@@ -119,25 +117,60 @@ def levenberg_marquardt(objective: Objective, history: History, limits: Limits) 
     return _by_least_squares(objective, history, limits, Residuals.dense, {"method": "lm"})
 
 
+def seen(residuals: Residuals, x: Array) -> Array | None:
+    """An orthonormal basis (n, k) of the directions of x that data or Phi see, of FEW x; None where they see all.
+
+    Where k is 1, gradient and step are parallel, and SciPy makes a plane of them that reaches in a blind direction. A
+    component that nothing depends on at all is left in: no step moves it, and it may be seen later.
+    """
+    if len(x) > FEW:
+        return None
+    A, every = residuals.dense(x), np.eye(len(x))
+    depends = A.any(axis=0)
+    _, s, V = np.linalg.svd(np.linalg.qr(A[:, depends], mode="r"))
+    rank = np.count_nonzero(s > RANK * s.max(initial=0.0))
+    if rank in (0, np.count_nonzero(depends)):
+        return None
+    return np.concatenate([every[:, ~depends], every[:, depends] @ V[:rank].T], axis=1)
+
+
 def _by_least_squares(objective: Objective, history: History, limits: Limits, derivative: Any, method: Any) -> str:
     from scipy.optimize import least_squares
 
-    residuals = Residuals(objective)
+    residuals, x_0 = Residuals(objective), objective.accepted.x.copy()
+    basis = seen(residuals, x_0)
+    y_0 = x_0 if basis is None else np.zeros(basis.shape[1])
+    by, how = derivative, method
+    if len(y_0) == 1 and method["method"] == "trf":  # its search in a plane of two directions ends in IndexError
+        by, how = Residuals.dense, {"method": "trf", "tr_solver": "exact"}
 
-    def jac(x: Array) -> Any:
+    def x_of(y: Array) -> Array:
+        return y if basis is None else x_0 + basis @ y
+
+    def r(y: Array) -> Array:
+        return residuals(x_of(y))
+
+    def jac(y: Array) -> Any:
         """Called where a step has been accepted."""
-        by_x = derivative(residuals, x)
+        x = x_of(y)
+        by_x = by(residuals, x)
         if not np.array_equal(x, objective.accepted.x):
             objective.tried.append(residuals.evaluated(x, by_x))
             accept(objective, history, limits, x)
             if len(history.iterates) > limits.iterations:
                 raise Stopped(spent(limits))
-        return by_x
+        return by_x if basis is None else by_x @ basis
 
     most = TRIALS * limits.iterations  # rejected steps are not iterations
-    tolerances: Any = {"xtol": TIGHT, "ftol": TIGHT, "gtol": TIGHT, "max_nfev": most}
-    result: Any = least_squares(residuals, objective.accepted.x.copy(), jac=jac, **tolerances, **method)
-    return spent(limits) if result.status == 0 else explained(objective)
+    gtol = TIGHT if method["method"] == "lm" else None  # a cosine there, else a slope in the units of J
+    tolerances: Any = {"xtol": TIGHT, "ftol": TIGHT, "gtol": gtol, "max_nfev": most}
+    result: Any = least_squares(r, y_0, jac=jac, **tolerances, **how)
+    if result.status == 0:
+        return spent(limits)
+    now = None if basis is None else seen(residuals, objective.accepted.x)
+    if basis is not None and (now is None or now.shape[1] > basis.shape[1]):  # as from a start that is far off
+        return _by_least_squares(objective, history, limits, derivative, method)
+    return explained(objective)
 
 
 def trust(objective: Objective, history: History, limits: Limits) -> str:

@@ -22,13 +22,19 @@ SHOWN = 4
 @dataclass(frozen=True, eq=False)
 class BoundaryValues:
     """values (n, d) [m] at the nodes; the numbers of the points that were used; the greatest distance from a node to
-    its nearest point [m], and the greatest standard deviation of a value [m], 0 if that of the data is unknown.
+    its nearest point [m]; and root (d, n, k) [m], root root^T the covariance of each component of the values, 0 if the
+    noise of the data is unknown.
     """
 
     values: Array
     used: Array
     gap: float
-    sigma: float
+    root: Array
+
+    @property
+    def sigma(self) -> float:
+        """The greatest standard deviation of a value [m]."""
+        return float(np.linalg.norm(self.root, axis=2).max())
 
     @classmethod
     def of(cls, X: Array, x: Array, d: Array, sigma: Array | float, who: str) -> BoundaryValues:
@@ -60,5 +66,8 @@ class BoundaryValues:
         A = np.concatenate([np.ones((*near.shape, 1)), (x[near] - X[:, None]) / spacing[:, None, None]], axis=2)
         c = np.linalg.pinv(weight[..., None] * A, rcond=1e-4 * AT_POINT)[:, 0] * weight  # (n, k): value = c . d
         used = np.unique(near[np.abs(c) > NOTHING])
-        noise = np.sqrt(np.einsum("nk,nkd->nd", c**2, np.broadcast_to(sigma, d.shape)[near] ** 2))
-        return cls(np.einsum("nk,nkd->nd", c, d[near]), used, float(distance[:, 0].max()), float(noise.max()))
+        of_points = np.zeros((len(X), len(x)))
+        np.put_along_axis(of_points, near, c, axis=1)
+        noisy = (of_points[:, used] * s for s in np.broadcast_to(sigma, d.shape)[used].T)
+        root = np.stack([np.asarray(np.linalg.qr(by_point.T, mode="r")).T for by_point in noisy])
+        return cls(np.einsum("nk,nkd->nd", c, d[near]), used, float(distance[:, 0].max()), root)

@@ -10,7 +10,7 @@ from gradient_routes.problems.data.csv import NumberFile
 from gradient_routes.problems.errors import InputError
 
 # rows that such a column tells apart belong to several J: fitted as one they give a wrong answer
-CASES = ("load", "loadcase", "case", "frame", "step", "time")
+CASES = ("load", "loadx", "loady", "loadz", "loadcase", "case", "frame", "step", "time")
 IN_FULL = {"t": "time", "T": "temperature"}  # names that differ by case alone
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.problems.data.boundary_values import BoundaryValues
-from gradient_routes.problems.data.load_cases import CASE, LOAD, LoadCases
+from gradient_routes.problems.data.load_cases import CASE, LOAD, LoadCases, vector_group
 from gradient_routes.problems.data.placing import Outside, place
 from gradient_routes.problems.data.repeats import without_repeats
 from gradient_routes.problems.data.strain_gauges import GROUP, StrainGauges, has_strains, strains_of
@@ -128,7 +128,7 @@ def read_probes(
     table = read_table(path, (*groups(axes, "none" if strained else "any"), GROUP), columns, units)
     x, d = table.stack(axes), table.stack([f"u{axis}" for axis in axes])
     e = strains_of(table, axes) if strained else np.empty((len(x), 0))
-    sigma, loads = noise_of(table, axes, d, noise), LoadCases.of(table)
+    sigma, loads = noise_of(table, axes, d, noise), LoadCases.of(table, axes)
     case = np.zeros(len(x), dtype=int) if loads is None else loads.rows
     if strained and case.any():
         raise InputError(f"{path}: strains under several loads are not read - keep the rows of one load")
@@ -155,7 +155,7 @@ def read_probes(
     seen = measured.any(axis=1) | (~np.isnan(e)).any(axis=1)
     blind = np.setdiff1d(np.arange(1 if loads is None else len(loads.values)), case[seen])
     if blind.size:
-        where = "" if loads is None else f" under load {loads.values[blind[0]]:g}, case {blind[0] + 1}"
+        where = "" if loads is None else f" under load {loads.named(blind[0])}, case {blind[0] + 1}"
         raise InputError(f"{path}: measures nothing{where} - give at least one row with a displacement")
     if isinstance(sigma, np.ndarray):
         level = float(np.mean(sigma[rows][measured] ** -2.0) ** -0.5)
@@ -199,6 +199,7 @@ def groups(axes: str, need: str = "any") -> tuple[Group, ...]:
         Group(tuple(f"u{axis}" for axis in axes), "length", need=need, gaps=True),
         Group(("sigma", *(f"sigma_{axis}" for axis in axes)), "length", need="none", gaps=True),
         LOAD,
+        vector_group(axes),
         CASE,
     )
 

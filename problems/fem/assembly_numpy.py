@@ -114,31 +114,33 @@ class NumpyAssembly:
         s, q_p = solid.setup(p), self._q_p(p)
         by_p = None if solid.design.chain is None else solid.design.chain(p)
         f_q = [self._by_constants(solid.displacements(u, s, case, self.nodes), s, q_p) for case in self._cases]
-        f_k = [self._by_springs(u, s, p, case) for case in self._cases]  # of p's last component
+        f_k = np.concatenate([self._by_springs(u, s, p, case) for case in self._cases])  # of p's last components
+        n = len(p) - f_k.shape[1]
 
         def forward(v: Array) -> Array:
-            v_k, v = v[-1], v if by_p is None else by_p @ v
+            v_k, v = v[n:], v if by_p is None else by_p @ v
             forces = (sum(f * v[of, None, None] for f, (_, of) in zip(f_case, q_p, strict=True)) for f_case in f_q)
             parts = [solid.bc.assemble(np.asarray(f), self.nodes, case)[0] for case, f in enumerate(forces)]
-            return np.asarray(np.concatenate(parts) + v_k * np.concatenate(f_k))
+            return np.asarray(np.concatenate(parts) + f_k @ v_k)
 
         def reverse(lam: Array) -> Array:
             total = np.zeros(len(p))
             for case, f_case in enumerate(f_q):
                 total = total + self._along(solid.bc.variations(lam, case, self.nodes), f_case, q_p, len(p))
             total = total if by_p is None else by_p.T @ total
-            total[-1] += lam @ np.concatenate(f_k)
+            total[n:] += lam @ f_k
             return total
 
         return ByProducts(forward, reverse)
 
     def _by_springs(self, u: Array, s: Setup, p: Array, case: int) -> Array:
-        """Nodal forces (n_free,) of the springs per unit of the last of p; 0 without springs."""
-        springs = self.solid.springs
+        """Nodal forces (n_free, k) of the springs per unit of each of the last k of p, none without springs."""
+        springs, bc = self.solid.springs, self.solid.bc
         if springs is None:
-            return np.zeros(self.solid.bc.n_free)
-        u_f = self.solid.displacements(u, s, case, springs.facets.nodes)
-        return self._of_springs(u_f, springs.k_p(p), case)
+            return np.zeros((bc.n_free, 0))
+        nodes = springs.facets.nodes
+        each = springs.each(self.solid.displacements(u, s, case, nodes))
+        return np.asarray(np.stack([bc.assemble(f, nodes, case)[0] for f in each], axis=1) * springs.k_p(p))
 
     def _q_p(self, p: Array) -> list[tuple[Array, Array]]:
         derivative = self.solid.design.q_p

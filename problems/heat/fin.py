@@ -83,16 +83,10 @@ class Fin:
         fitted = {"film": k * ratio, "conductivity": k, "flux": k * by_flux}
         return known | {name: fitted[name] for name in names}
 
-    def check_reach(self, sizes: Mapping[str, float], x: float) -> None:
-        """Raises InputError for a start of which no thermocouple, the first at x, sees more than the surroundings: the
-        gradient there is 0, as it is at a minimum.
-        """
+    def reaches(self, sizes: Mapping[str, float], x: float) -> bool:
+        """Whether a thermocouple at x sees more than the surroundings: if none does, the gradient is 0."""
         h, k = sizes["film"], sizes["conductivity"]
-        if not self.behind.size and x * math.sqrt(h * self.P / (k * self.A)) > UNSEEN:
-            raise InputError(
-                f"rod: at film={h:g}, conductivity={k:g} no heat reaches the first thermocouple, x = {x:g} m - leave"
-                " the unknown one out, then it starts from the data"
-            )
+        return bool(self.behind.size) or x * math.sqrt(h * self.P / (k * self.A)) <= UNSEEN
 
 
 def value(name: str, given: Mapping[str, Any]) -> float:

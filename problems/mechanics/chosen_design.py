@@ -48,9 +48,7 @@ def design_of(
         "layers": lambda: design_variables.layers(mesh, law, o.nu, log, uniform, E, o.layers),
         "regions": lambda: design_variables.regions(mesh, law, o.nu, log, uniform, E),
         "thickness": lambda: design_variables.thicknesses(mesh, base.q, log, uniform),
-        "constants": lambda: (
-            constants.design(mesh, law, o.nu, E) if constants else design_variables.constants(mesh, law, o.nu, E)
-        ),
+        "constants": lambda: constants.design(mesh, law, o.nu, E),  # type: ignore[union-attr]
         "traction": lambda: design_variables.tractions(
             mesh, supports.loaded, loading.amplitude * loading.directions[0]
         ),

@@ -9,7 +9,7 @@ Parameters of the former are logarithms of what must be positive, so that the la
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,11 @@ class Constants:
 
     names: tuple[str, ...]
     start: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, text: str | None, law: MaterialLaw, who: str) -> Constants:
+        """Those of the option `constants`; mu,lam where it is not given, else those of the law as it names them."""
+        return cls.parse(text or ",".join(law.constants), law, who)
 
     @classmethod
     def parse(cls, text: str, law: MaterialLaw, who: str, incompressible: bool = False) -> Constants:
@@ -127,6 +132,16 @@ class Constants:
             chain=self.by_p,
             by_stiffness=np.array([1.0, 0.0 if self.names == ("E", "nu") else 1.0]),
         )
+
+    def of_law(self, q: Sequence[float]) -> Array:
+        """p of all constants q [Pa] of the law. Raises InputError for mu and lam of an unstable one."""
+        if not self.paired:
+            return np.array(q)
+        mu, lam = q
+        K = lam + 2.0 * mu / 3.0
+        if not (mu > 0.0 and K > 0.0):
+            raise InputError(f"mu={mu:g}, lam={lam:g}: K = {K:g} Pa - the law is stable for mu > 0, lam > -2 mu/3")
+        return self.of_lame(mu, lam)
 
     def of_lame(self, mu: float, lam: float) -> Array:
         """p of Lame's constants."""

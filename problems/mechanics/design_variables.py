@@ -35,7 +35,7 @@ class Setup:
     q     material constants, numbers or (n_e,) [Pa]
     X     nodal positions (n_nodes, d) [m]
     load  the amplitude [Pa] or [m], or tractions (n_f, d) [Pa]
-    k     stiffness of a support on springs [Pa/m]
+    k     stiffnesses of a support on springs [Pa/m]
     """
 
     q: tuple[Any, ...]

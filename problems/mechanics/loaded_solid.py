@@ -226,6 +226,12 @@ class LoadedSolid:
             blocks.append(self.pattern.assemble(K))
         return blocks[0] if len(blocks) == 1 else BlockDiagonal(tuple(blocks))
 
+    def element_matrices(self, u_e: Array, s: Setup) -> Array:
+        """Those of the stresses, (n_e, d n_a, d n_a), for displacements u_e (n_e, n_a, d) of the cells' nodes."""
+        m = u_e.shape[1] * u_e.shape[2]
+        by = self.by_hand if self.use_numpy else self._jax
+        return np.asarray(by.element_tangents(u_e, s.q, *self.metric(s, np), np.arange(m * m))).reshape(-1, m, m)
+
     @cached_property
     def pattern(self) -> SymmetricPattern | GeneralPattern:
         geometry, n = self.mesh.geometry, self.bc.n_free

@@ -60,5 +60,11 @@ class Loading:
         if o.force is not None and loads.kind != "ratio":
             raise InputError(f"{who}: force= and column load of {o.data} both state the load - keep one")
         a = loads.amplitudes(o.load, self.amplitude, self.area, who)
+        if a.ndim == 2:
+            if o.load == "follower" or o.direction is not None:
+                other = "load=follower" if o.load == "follower" else f"direction={o.direction}"
+                raise InputError(f"{who}: {other} and columns load_x.. of {o.data} both state a direction - keep one")
+            largest = self.amplitude if loads.kind == "ratio" else float(np.linalg.norm(a, axis=1).max())
+            return replace(self, amplitude=largest, directions=a / (largest or 1.0), forces=F)
         largest = self.amplitude if loads.kind == "ratio" else float(a[np.abs(a).argmax()])
         return replace(self, amplitude=largest, directions=np.outer(a / (largest or 1.0), self.directions[0]), forces=F)

@@ -31,14 +31,15 @@ def measured_nodes(mesh: Mesh, o: SimpleNamespace) -> Array:
     return nodes
 
 
-def in_words(found: Sequence[BoundaryValues]) -> str:
-    """How the nodes' displacements were found, and their noise."""
+def in_words(found: Sequence[BoundaryValues], dead: bool) -> str:
+    """How the nodes' displacements were found, and their noise; dead: whether loads do not follow u."""
     points, nodes = sum(len(of.used) for of in found), sum(len(of.values) for of in found)
     gap, sigma = max(of.gap for of in found), max(of.sigma for of in found)
-    noise = f"noise, up to {sigma:.3g} m, is" if sigma else "noise, which is not stated, is"
+    noise = f"noise, up to {sigma:.3g} m, is in {'the' if dead else 'no'} error bars"
+    noise = noise if sigma else "noise, which is not stated, is in no error bar"
     return (
         f"boundary: {nodes} nodes take the displacements of {points} points about them, the nearest up to {gap:.3g} m"
-        f" from a node; their {noise} in no error bar"
+        f" from a node; their {noise}"
     )
 
 
@@ -46,6 +47,11 @@ def forces(o: SimpleNamespace, loads: LoadCases | None, who: str) -> Array | Non
     """The force [N] in every load case where grips are at known displacements, None where none is given."""
     if loads is None:
         return None if o.force is None else np.array([o.force])
+    if loads.values.ndim == 2 and o.boundary == "measured":
+        raise InputError(
+            f"{who}: with boundary=measured, load=displacement columns load_x.. of {o.data} are no datum - give the"
+            " force along direction= as a column load"
+        )
     if o.boundary == "measured":
         if loads.kind == "force":
             if o.force is not None:

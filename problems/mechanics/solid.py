@@ -17,6 +17,7 @@ from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.errors import InputError, NotOffered
 from gradient_routes.problems.fem.mesh import AXES, Mesh
 from gradient_routes.problems.fem.prolongation import prolongate
+from gradient_routes.problems.mechanics.boundary_noise import boundary_noise
 from gradient_routes.problems.mechanics.chosen_design import base_of, design_of
 from gradient_routes.problems.mechanics.constants import Constants
 from gradient_routes.problems.mechanics.design_variables import FITTED, MATERIAL
@@ -32,6 +33,7 @@ from gradient_routes.problems.problem import (
     End,
     Fields,
     Linearization,
+    Nuisance,
     Offers,
     Operator,
     ParameterView,
@@ -71,10 +73,11 @@ class Solid(Problem):
         found = read_file(mesh, o, self.noise, supports.known) if self.measured else None
         if found is not None:
             loading = loading.of_file(o, supports, found.loads, self.name)
-        self.constants = None if o.constants is None else Constants.parse(o.constants, law, self.name)
+        self.constants = Constants.of(o.constants, law, self.name) if o.unknown == "constants" else None
 
         base = base_of(o, mesh, law, loading, self.measured)
-        bc = supports.boundary_conditions(mesh, loading.directions, () if found is None else found.boundary)
+        self.boundary = () if found is None else found.boundary
+        bc = supports.boundary_conditions(mesh, loading.directions, self.boundary)
         design = design_of(o, self.log, mesh, law, base, supports, loading, self.constants)
         on, along, springs = supports.loaded, loading.directions, supports.springs
         self.solid = LoadedSolid(mesh, law, bc, on, o.load, along, design, base, springs, use_numpy)
@@ -132,6 +135,10 @@ class Solid(Problem):
     def observation(self, u: Array, p: Array) -> Observation:
         return self.data.observation(u, p)
 
+    def taken_as_exact(self, u: Array, p: Array) -> Nuisance | None:
+        """Measured displacements of the boundary."""
+        return boundary_noise(self.data, self.boundary, u, p)
+
     def candidates(self) -> Candidates:
         return self.data.candidates()
 
@@ -159,7 +166,8 @@ class Solid(Problem):
         if o["mesh"] is not None or unknown in ("traction", "shape"):
             return None
         doubled = {name: 2 * (o[name] or o["n"]) for name in ("nx", "ny", "nz") if name in o}
-        layers = len(p) - (self.solid.springs is not None) if unknown == "layers" else None
+        springs = self.solid.springs
+        layers = len(p) - (0 if springs is None else springs.count) if unknown == "layers" else None
         finer = type(self)(**o | doubled | {"n": 2 * o["n"], "layers": layers})
         if unknown not in ("modulus", "thickness"):
             return finer, p
@@ -178,7 +186,8 @@ class Solid(Problem):
             return np.asarray(p + np.log(factor) * self.solid.design.by_stiffness)
         q = p + np.log(factor) if self._is_log else factor * p
         if self.solid.springs is not None and self.log:
-            q[-1] = p[-1] + np.log(factor)
+            of_k = slice(-self.solid.springs.count, None)
+            q[of_k] = p[of_k] + np.log(factor)
         return q
 
     def stiffened(self, factor: float) -> Solid:
@@ -188,26 +197,32 @@ class Solid(Problem):
         other = copy.copy(self)
         scale = self.parameters.scale * (1.0 if self._is_log else factor)
         if self.solid.springs is not None and self.log:
-            scale[-1] = 1.0
+            scale[-self.solid.springs.count :] = 1.0
         other.parameters = replace(self.parameters, start=start, scale=scale)
         other.regularization = other._prior(self.alpha)
         return other
 
     def completed(self, given: Mapping[str, float]) -> Array | None:
-        """Constants of the law by name, of a material of constant volume: the last of them is told by nu.
+        """Constants [Pa] of the law by name; of a material of constant volume without the last, which nu tells.
 
         Raises InputError for nu that is far from constant volume.
         """
-        law, nu = self.solid.law, self._options["nu"]
-        if self._options["unknown"] != "constants" or set(given) != set(law.constants[:-1]):
+        law, nu, constants = self.solid.law, self._options["nu"], self.constants
+        if (
+            constants is None
+            or self.solid.springs is not None
+            or set(given) not in ({*law.constants}, {*law.constants[:-1]})
+        ):
             return None
-        if nu < NEARLY_CONSTANT_VOLUME:
-            raise InputError(
-                f"{self.name}: the constants {', '.join(given)} are of a material of constant volume, beside nu={nu:g}"
-                f" - set nu={NEARLY_CONSTANT_VOLUME:g} or more, it tells {law.constants[-1]}"
-            )
-        q = [given[name] for name in law.constants[:-1]]
-        return np.array([*q, law.of_volume(q, nu)])
+        q = [given[name] for name in law.constants if name in given]
+        if len(q) < len(law.constants):
+            if nu < NEARLY_CONSTANT_VOLUME:
+                raise InputError(
+                    f"{self.name}: the constants {', '.join(given)} are of a material of constant volume, beside"
+                    f" nu={nu:g} - set nu={NEARLY_CONSTANT_VOLUME:g} or more, it tells {law.constants[-1]}"
+                )
+            q.append(law.of_volume(q, nu))
+        return constants.of_law(q)
 
     @property
     def _is_log(self) -> bool:
@@ -216,13 +231,8 @@ class Solid(Problem):
 
     def stated(self, p: Array) -> dict[str, Any]:
         """Constants as people state them, E and nu besides, of laws that have them; the stiffness of springs."""
-        k = {} if self.solid.springs is None else {"k [Pa/m]": self.solid.springs.k(p)}
-        if self.constants is not None and self.constants.paired:
-            return self.constants.stated(p[:2]) | k
-        if self._options["unknown"] != "constants" or self.solid.law.constants != ("mu", "lam"):
-            return k
-        mu, lam = p[:2]
-        return {"E [Pa]": mu * (3.0 * lam + 2.0 * mu) / (lam + mu), "nu": 0.5 * lam / (lam + mu)} | k
+        k = {} if self.solid.springs is None else self.solid.springs.stated(p)
+        return (self.constants.stated(p[:2]) if self.constants is not None and self.constants.paired else {}) | k
 
     def ends(self, p: Array) -> list[End]:
         return self.constants.ends(p[:2]) if self.constants is not None and self.constants.paired else []

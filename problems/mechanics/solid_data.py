@@ -73,7 +73,7 @@ def _from_file(
     o: SimpleNamespace, solid: LoadedSolid, clamp: Array, measured: probes.Measured, F: Array | None
 ) -> tuple[DisplacementData, tuple[str, ...]]:
     who = solid.mesh.who
-    said = [*measured.notes, *([in_words(measured.boundary)] if measured.boundary else [])]
+    said = [*measured.notes, *([in_words(measured.boundary, solid.symmetric)] if measured.boundary else [])]
     if measured.strains is not None and solid.design.moved_nodes is not None:
         raise InputError(f"{who}: strains are read in a mesh that stands still, not with unknown=shape")
     data = DisplacementData(solid, measured.probes, measured.d, measured.sigma, strains=measured.strains)

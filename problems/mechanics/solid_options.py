@@ -27,7 +27,7 @@ Law = Annotated[LawName, "stored energy; arap: as rigid as possible"]
 Nu = Annotated[float, "Poisson's ratio at small strain"]
 Constants = Annotated[
     str | None,
-    "that are unknown: E,nu mu,lam K,G C10,C01,c .., with starts as in E:200GPa,nu:0.3 [mu,lam, untransformed]",
+    "that are unknown: E,nu mu,lam K,G C10,C01,c .., with starts as in E:200GPa,nu:0.3 [mu,lam, or the law's]",
 ]
 Modulus = Annotated[float | None, "Young's, to start from or known [1; fitted to a file's data]"]
 Derivatives = Annotated[
@@ -38,7 +38,8 @@ Columns = Annotated[str | None, "of the file, x:NAME,ux:NAME; y:3mm for every ro
 Units = Annotated[str | None, "of the file's columns, mm or x:mm,ux:um [the header's, else the mesh's]"]
 OutsideOf = Annotated[Outside, "the file's points outside the body: an error, left out, or moved onto it"]
 SupportOf = Annotated[
-    Literal["clamp", "springs"], "of the clamped face: held, or on springs of one stiffness per area k, unknown besides"
+    Literal["clamp", "springs", "springs-nt"],
+    "of the clamped face: held, or on springs of unknown stiffness per area k; k_n along its normal, k_t across it",
 ]
 BoundaryOf = Annotated[
     Literal["zero", "measured"], "displacements of the clamped face, and of a grip: measured, the data that lie there"

@@ -20,8 +20,9 @@ def prior_of(alpha: float, o: SimpleNamespace, solid: LoadedSolid, parameters: P
     pairs = np.asarray(f2t.T[f2t[1] != -1]) if o.unknown in CELLWISE else None
     n, scale = len(parameters), parameters.scale.copy()
     if solid.springs is not None:  # k has no neighbours, and no prior
-        pairs = np.stack([np.arange(1, n - 1), np.arange(n - 2)], axis=1) if o.unknown == "layers" else pairs
-        scale[-1] = np.inf
+        n -= solid.springs.count
+        pairs = np.stack([np.arange(1, n), np.arange(n - 1)], axis=1) if o.unknown == "layers" else pairs
+        scale[n:] = np.inf
     prior = Prior(alpha, kind, o.phi_width, pairs, parameters.start, scale)
     if kind == "amplitude" and o.unknown in MODULI:
         prior = replace(prior, origin=theta, scale=np.where(np.isinf(scale), scale, 1.0))

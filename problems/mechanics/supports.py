@@ -47,7 +47,7 @@ class Supports:
         """From the options `o` of a solid. Raises InputError for a loaded face of which all is clamped."""
         loaded, gripped = mesh.boundary(o.loaded, surface=True), o.load == "displacement"
         known = measured_nodes(mesh, o)
-        springs = Springs.on(mesh, o.clamped, log) if o.support == "springs" else None
+        springs = None if o.support == "clamp" else Springs.on(mesh, o.clamped, log, o.support == "springs-nt")
         supported = known if springs is None else springs.facets.node_set
         held = held_components(mesh, "none" if supported.size else o.clamped, o.fixed, supported)
         clamp = np.flatnonzero(held.all(axis=1))

@@ -12,9 +12,12 @@ import pytest
 from conftest import relative_error
 from test_plate import complex_gradient, stretches
 
+from gradient_routes.bench.cases.case import problems, routes
+from gradient_routes.bench.inversion.invert import Engine, invert
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.data.load_cases import MAX_CASES
 from gradient_routes.problems.errors import InputError, NotOffered
+from gradient_routes.problems.mechanics.solid import Solid
 from gradient_routes.problems.plate import Plate
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
@@ -109,7 +112,50 @@ def test_loads_may_be_displacements_of_a_grip_and_cases_have_names(tmp_path: Pat
         Block(n=1, load="displacement", data=data, units=units)
 
 
+DIRECTED: dict[str, Any] = {"n": 2, "derivatives": "hand", "unknown": "layers", "layers": 2}
+TRUTH = np.array([0.2, -0.3])
+
+
+def directed(folder: Path, kind: type[Solid], unit: str) -> str:
+    """u of a body under two loads in two directions, read at its nodes; the loads, of an area of 1 m^2, in columns."""
+    made = kind(**DIRECTED, cases=2)
+    u, X = Model(made, TIGHT).solve(TRUTH).u, made.mesh.geometry.X
+    axes, lines = "xyz"[: X.shape[1]], []
+    for case, direction in enumerate(made.solid.directions):
+        U = made.solid.displacements(u, made.solid.setup(TRUTH), case, np.arange(len(X)))
+        load = np.broadcast_to(0.2 * direction, X.shape)
+        lines += [",".join(map(repr, row)) for row in np.c_[X, U, load][X[:, -1] > 0.0].tolist()]
+    header = [*axes, *(f"u{axis}" for axis in axes), *(f"load_{axis}{unit}" for axis in axes)]
+    return written(folder, ",".join(header), lines)
+
+
+@pytest.mark.parametrize(("kind", "unit"), [(Plate, " [N]"), (Block, " [Pa]")])
+def test_loads_may_differ_in_direction(kind: type[Solid], unit: str, tmp_path: Path) -> None:
+    solid = kind(**DIRECTED, data=directed(tmp_path, kind, unit), modulus=1.0)
+    assert solid.objective(Model(solid, TIGHT).solve(TRUTH).u, TRUTH) < 1e-26
+    assert f"load cases by columns load_x, load_y.., {unit[2:-1]}: (0, " in " ".join(solid.read_as)
+    p = TRUTH + np.array([0.1, 0.2])
+    exact = complex_gradient(solid, p)
+    for route in (tangent, adjoint):
+        assert relative_error(route.prepare(Model(solid, TIGHT), p)(p).gradient, exact) < 1e-12, route.name
+    ended = invert(problems([kind.name])[0], routes(["adjoint"])[0], Engine("gauss-newton"), made=solid)
+    assert ended.p == pytest.approx(TRUTH, abs=1e-8)
+
+
+def test_a_grip_may_move_in_several_directions(tmp_path: Path) -> None:
+    lines = ["0.5,0.5,0.1,0,0.2,0", "0.5,0.5,0,0.1,0,0.2", "0.2,0.5,0,0.1,0,0.2"]
+    data = written(tmp_path, "x,y,ux,uy,load_x [mm],load_y [mm]", lines)
+    units = "x:m,y:m,ux:m,uy:m,load_x:mm,load_y:mm"
+    plate = Plate(n=2, derivatives="hand", load="displacement", data=data, units=units, modulus=1.0)
+    assert (plate.solid.base.load * plate.solid.directions).tolist() == [[2e-4, 0.0], [0.0, 2e-4]]
+
+
 REFUSED: dict[str, tuple[str, str, dict[str, Any], str]] = {
+    "a component beside a load": ("load [N],load_x [N]", "1,1", {}, "columns load and load_x both state the load"),
+    "components of two kinds": ("load_x [N],load_y", "1,1", {}, "load_x is a force, load_y a ratio - state the unit"),
+    "a component across a plane": ("load_z [N]", "1", {}, "column load_z [N] tells cases apart"),
+    "components and a direction": ("load_x [N]", "1", {"direction": "x"}, "direction=x and columns load_x.. of"),
+    "components of a follower": ("load_y [Pa]", "1", {"load": "follower"}, "load=follower and columns load_x.. of"),
     "no load": ("case", "1", {}, "column case tells cases apart, but not the load of each - add a column load"),
     "a gap": ("load", "", {}, "line 2, column load: '' is not a number"),
     "two loads": ("load [N]", "1", {"force": 2.0}, "force= and column load of"),

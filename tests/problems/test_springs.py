@@ -11,6 +11,8 @@ import pytest
 from conftest import relative_error
 from test_plate import complex_gradient, displacements
 
+from gradient_routes.bench.cases.case import problems, routes
+from gradient_routes.bench.inversion.invert import Engine, invert
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.mechanics.solid import Solid
@@ -72,6 +74,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "raw moduli, two loads": {"parametrization": "raw", "cases": 2, "alpha": 0.1, "phi": "tv"},
     "constants": {"unknown": "constants", "law": "mooney-rivlin", "alpha": 1e-3},
     "E,nu": {"unknown": "constants", "constants": "E,nu"},
+    "k_n and k_t": {"support": "springs-nt", "unknown": "layers", "alpha": 0.1},
+    "raw k_n and k_t of a ring": {"support": "springs-nt", "kind": "axisymmetric", "parametrization": "raw"},
     "a ring": {"kind": "axisymmetric", "radius": 0.5, "element": "tri6", "data": "twin", "noise": 1e-3},
     "raw moduli, amplitude": {
         "parametrization": "raw",
@@ -89,16 +93,38 @@ def test_exact_routes_agree_with_complex_steps(name: str) -> None:
     check(plate, (tangent, adjoint))
 
 
-@pytest.mark.parametrize("unknown", ["load"])
-def test_routes_by_jax_agree_with_complex_steps(unknown: Any) -> None:
-    check(Plate(n=1, law="linear", support="springs", unknown=unknown, load="displacement"), (adjoint, implicit_ad))
+def test_routes_by_jax_agree_with_complex_steps() -> None:
+    check(Plate(n=1, law="linear", support="springs-nt", unknown="load", load="displacement"), (adjoint, implicit_ad))
 
 
-def check(plate: Solid, routes: tuple[Any, ...]) -> None:
+@pytest.mark.parametrize("kind", [Plate, Block])
+def test_stiffnesses_along_the_normal_and_across_come_back_exactly(kind: type[Solid]) -> None:
+    """Of a homogeneous body pulled obliquely: int k u dA over its face balances the load, component by component."""
+    t = 0.05 * np.array([0.6, 0.8] if kind is Plate else [0.6, 0.0, 0.8])
+    along = ",".join(f"{c:g}" for c in t / 0.05)
+    options = {"unknown": "constants", "constants": "E,nu", "direction": along, "traction": 0.05, "data": "twin"}
+    solid = with_synthetic_data(kind(**HAND | {"support": "springs-nt"} | options, sensors="everywhere"))
+    truth, springs = solid.truth(), solid.solid.springs
+    k_n, k_t = springs.k(truth)
+    U = displacements(solid, truth)[springs.facets.nodes]
+    u = np.einsum("fqa,fai,fq->i", springs.facets.N, U, springs.facets.areas(solid.mesh.geometry.X, np))
+    assert k_n != k_t
+    np.testing.assert_allclose(np.where(np.arange(len(t)) == len(t) - 1, k_n, k_t) * u, t, atol=1e-12)
+    p = solid.parameters.start
+    for route in (tangent, adjoint):
+        g = route.prepare(Model(solid, TIGHT), p)(p).gradient
+        assert relative_error(g, complex_gradient(solid, p)) < 1e-12, route.name
+    spec, by = problems([f"{kind.name}[derivatives=hand]"])[0], routes(["adjoint"])[0]
+    ended = invert(spec, by, Engine("gauss-newton"), made=solid)
+    assert ended.p == pytest.approx(truth, abs=1e-6)  # |dJ/dp| is 1e-9 of 1/2 |d|^2
+    assert [*solid.stated(truth)][-2:] == ["k_n [Pa/m]", "k_t [Pa/m]"]
+
+
+def check(plate: Solid, by: tuple[Any, ...]) -> None:
     parameters = plate.parameters
     p = parameters.start + 0.05 * parameters.scale * np.random.default_rng(0).uniform(-1.0, 1.0, len(parameters))
     model, exact = Model(plate, TIGHT), complex_gradient(plate, p)
-    for route in routes:
+    for route in by:
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
     if not plate.alpha:
         state = model.solve(p)

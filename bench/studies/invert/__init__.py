@@ -26,10 +26,13 @@ RATE = "Of adam's steps, in natural changes of p."
 AT_NOISE = "End at the first step that meets the data to their noise: the discrepancy principle for iterations."
 LINEAR = "One linear solve in place of an iteration: the map from readings to p, about the start."
 MAP = "A map that -o has saved, in place of --problem."
-FRAMES = "Readings to apply it to: CSV with a column a reading and a row a frame, or .npz with one array."
+FRAMES = (
+    "Readings to apply it to, a row a frame: CSV with columns of their names, or .npz with one array in their order."
+)
 OUTPUT = (
-    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; FILE.vtu: u and p on the mesh. With"
-    f" --linear p of every frame as CSV, and FILE.npz, the map. {replaces('file of its kind')}"
+    "FILE.csv: estimates and error bars, a parameter a line, which --at reads; FILE.vtu: u and p on the mesh,"
+    " residuals at the data. With --linear p of every frame as CSV, and FILE.npz, the map."
+    f" {replaces('file of its kind')}"
 )
 RESUME = "From where the last run of the same (problem, route, optimizer, start) in the store ended."
 RUN = ("problem", "problem_options", "at", "route", "route_options", "optimizer")

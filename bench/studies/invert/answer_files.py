@@ -6,6 +6,7 @@ import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from gradient_routes.bench.inversion.residual_cloud import residual_cloud
 from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.store.output_files import Output
 from gradient_routes.bench.studies.bill import vtu
@@ -43,8 +44,9 @@ def write(output: Output, inversions: Sequence[Inversion], solver: Solver) -> st
     fields = last.made.fields(last.p, Model(last.made, solver).solve(last.p).u, None, last.gradient)
     if fields is None:
         raise InputError(f"{output}: {last.problem} has no mesh - take a .csv")
-    vtu.write(output, fields)
-    return f"fields in {output.path}"
+    cloud = residual_cloud(last.fit)
+    vtu.write(output, fields, cloud)
+    return f"fields in {output.path}" + ("" if cloud is None else f", residuals at {len(cloud[0])} points of the data")
 
 
 def _estimates(output: Output, inversions: Sequence[Inversion]) -> None:

@@ -56,7 +56,10 @@ def by_map(
             by.save(file)
         say(Note(f"the map in {outputs['.npz'].path}", result=True))
     if frames is not None:
-        estimates = estimated(by, read_frames(frames, by))
+        readings, remark = read_frames(frames, by)
+        if remark is not None:
+            say(Note(remark))
+        estimates = estimated(by, readings)
         estimates.write(outputs[".csv"])
         say(Found(Framed(estimates)))
         code = max(code, int(estimates.unexplained))

@@ -72,6 +72,21 @@ def test_constants_of_a_coupon_are_those_of_a_block(tmp_path: Path) -> None:
         point(Block(**BLOCK), str(path))
 
 
+def test_lame_constants_by_name_are_taken_as_their_logarithms(tmp_path: Path) -> None:
+    """As a coupon writes them, compressible or not."""
+    path, block = tmp_path / "c.csv", Block(n=1, derivatives="hand", unknown="constants", nu=0.46)
+    path.write_text("parameter,unit,estimate\nmu,Pa,2e5\nlam,Pa,-1e5\n")
+    assert block.constants.lame(point(block, str(path))) == pytest.approx((2e5, -1e5))
+    path.write_text("parameter,unit,estimate\nmu,Pa,2e5\n")
+    assert block.stated(point(block, str(path)))["nu"] == pytest.approx(0.46)
+    path.write_text("parameter,unit,estimate\nmu,MPa,0.2\n")
+    with pytest.raises(InputError, match=r"mu is in MPa, not in Pa - convert it"):
+        point(block, str(path))
+    path.write_text("parameter,unit,estimate\nmu,Pa,3\nlam,Pa,-4\n")
+    with pytest.raises(InputError, match=r"mu=3, lam=-4: K = -2 Pa"):
+        point(block, str(path))
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import meshio
 import numpy as np
 import pytest
 
@@ -168,6 +169,20 @@ def test_constants_of_every_choice_are_the_same_with_the_same_bars(cli, tmp_path
     assert other["K [Pa]"]["value"] == pytest.approx(E / 3 / (1 - 2 * nu), rel=1e-5)
 
 
+def test_residuals_are_fields_on_the_points_of_the_data(cli, tmp_path) -> None:
+    (tmp_path / "d.csv").write_text(patch(0.25, "ux,uy"))
+    files = ("-o", str(tmp_path / "p.vtu"), "--no-store", "--json")
+    ran = cli("invert", "--problem", f"{PATCH},constants=E,nu]", "--optimizer", "gauss-newton", *files)
+    rows = [row for row in ran.rows if row["table"] == "residuals" and row["quantity"] == "uy"]
+    grid = meshio.read(tmp_path / "p.vtu")
+    at = grid.cells_dict["vertex"].ravel()
+    known = {(x, y): r for (x, y, _), r in zip(grid.points[at], grid.point_data["residual_uy"][at], strict=True)}
+    assert len(rows) == len(known) == 16
+    assert all(known[row["x"], row["y"]] == pytest.approx(row["residual"], abs=1e-18) for row in rows)
+    assert np.isnan(grid.point_data["residual_over_noise_ux"][: at[0]]).all()
+    assert np.isnan(grid.point_data["u"][at]).all()
+
+
 def test_a_constant_at_its_bound_has_no_bar_and_the_other_one_has_with_it_held(cli, tmp_path) -> None:
     """Data of nu = 0.7: nu ends at 0.5, and E is that of one unknown, E^2 sigma / (t |(y, x/2)|)."""
     found = said(cli, tmp_path, "E,nu", nu=0.7)
@@ -179,6 +194,8 @@ def test_a_constant_at_its_bound_has_no_bar_and_the_other_one_has_with_it_held(c
     assert found["E [Pa]"]["sd"] == pytest.approx(sd, rel=1e-5)
     ran = cli("invert", "--problem", f"{PATCH},constants=E,nu]", "--no-store", "--no-plot")
     assert "nu is at its bound, 0.5: dJ/dnu < 0, the data want it beyond; error bars of the others are" in ran.out
+    ran = cli("invert", "--problem", f"{PATCH}]", "--no-store", "--no-plot")  # mu, lam: never past it
+    assert "lam is at its bound, infinity: dJ/dlam < 0, the data want it beyond" in ran.out
 
 
 def test_a_blind_direction_is_named_and_gets_no_bar(cli, tmp_path) -> None:
