@@ -17,10 +17,12 @@ CACHE = ROOT / ".pytest_cache" / "jax"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(CACHE))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 os.environ.setdefault("JAX_TRACEBACK_IN_LOCATIONS_LIMIT", "0")  # a tenth of what tracing takes
-# tests compile more than they compute: no optimization, and the emitters that compile in two thirds of the time, which
-# newer versions of jaxlib do not have: they end the process at a flag that they do not know
-EMITTERS = " --xla_cpu_use_fusion_emitters=false" if version("jaxlib").startswith("0.10.") else ""
-os.environ.setdefault("XLA_FLAGS", f"--xla_backend_optimization_level=0{EMITTERS}")
+# tests compile more than they compute: no optimization, the emitters that compile in two thirds of the time, and no
+# parts for many cores, which save another quarter; newer versions of jaxlib end the process at a flag they do not know
+KNOWN = " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+os.environ.setdefault(
+    "XLA_FLAGS", f"--xla_backend_optimization_level=0{KNOWN if version('jaxlib').startswith('0.10.') else ''}"
+)
 
 # where Python is to write no bytecode, hundreds of processes would compile the package anew
 if sys.dont_write_bytecode and "PYTEST_XDIST_WORKER" not in os.environ:
