@@ -16,7 +16,7 @@ HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "vl_convert"}
 FLOORS = ("problems", "routes", "bench")
 # what routes may know of floor 1: the contract, no single problem
 MATRICES = {f"matrices.{kind}" for kind in ("tridiagonal", "sparse", "recurrence", "step_matrix")}
-CONTRACT = {"problem", "transient", "errors", "text", "jax64"} | MATRICES
+CONTRACT = {"problem", "transient", "rates", "errors", "text", "jax64"} | MATRICES
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (
     *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "environments", "render"),
@@ -29,9 +29,12 @@ TRACED = {
     "gradient_routes.problems.mechanics.energies",
     "gradient_routes.problems.mechanics.isotropic_functions",
     "gradient_routes.problems.mechanics.plane_energies",
+    "gradient_routes.problems.mechanics.polar",
     "gradient_routes.problems.mechanics.principal_stress",
     "gradient_routes.routes.differentiable",
     "gradient_routes.routes.solvers.traced_iterations",
+    "gradient_routes.routes.traced_steps",
+    "gradient_routes.routes.unrolled_march",
     "gradient_routes.routes.unrolled_newton",
 }
 
