@@ -11,22 +11,25 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from gradient_routes.problems.bar import THETA_MAX, true_modulus
 from gradient_routes.problems.contact import K_C, STOP_WIDTH, CompliantStop, RigidStop, Stop, make_stop
+from gradient_routes.problems.data.every_step import EveryStep, read_histories_of_nodes
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
+from gradient_routes.problems.data.units import standard_deviation
+from gradient_routes.problems.dynamics.bar_unknowns import UNIT_OF, BarUnknowns
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
-from gradient_routes.problems.problem import Array, Linearization, Offers, Parameters, ParameterView, Traced
+from gradient_routes.problems.problem import Array, Linearization, Offers, ParameterView, Traced
 from gradient_routes.problems.rates import Rates
 from gradient_routes.problems.transient import Transient
 
@@ -64,8 +67,11 @@ class VibratingBar(Transient):
         c_k: Annotated[float, "c_K of rayleigh [s]"] = 0.01,
         c_g: Annotated[float, "strength of skew damping, times M/s"] = 0.1,
         sensors: Annotated[Nodes | None, "5: nodes 1 to 5; 1,3,5 or 2..6: these [every second]"] = None,
-        parametrization: Annotated[Literal["log", "raw"], "p = log E or p = E"] = "log",
-        modulus: Annotated[float, "E of the start [Pa]"] = 1.0,
+        unknown: Annotated[
+            str, "what p is: moduli, damping, velocity (of nodes at first), or some: moduli,damping"
+        ] = "moduli",
+        parametrization: Annotated[Literal["log", "raw"], "of moduli and damping: p = log E or p = E"] = "log",
+        modulus: Annotated[float | None, "E of the start [Pa] [1; a file's bar has no default]"] = None,
         density: Annotated[float, "rho [kg/m3]"] = 1.0,
         length: Annotated[float, "L [m]"] = 1.0,
         area: Annotated[float, "cross-section A [m2]"] = 1.0,
@@ -75,7 +81,12 @@ class VibratingBar(Transient):
         gap: Annotated[float, "that the tip may move before it meets the stop [m]"] = GAP,
         k_c: Annotated[float, "stiffness of the stop [N/m]"] = K_C,
         width: Annotated[float, "over which softplus and quadratic round the kink of the penalty [m]"] = STOP_WIDTH,
-        noise: Annotated[float, "standard deviation added to data [m]"] = 0.0,
+        data: Annotated[str | None, "file of histories, columns t,node,displacement [synthetic]"] = None,
+        columns: Annotated[str | None, "of the file, t:NAME,node:NAME,displacement:NAME [by its header]"] = None,
+        units: Annotated[str | None, "of the file, such as ms,um [the header's, else s and m]"] = None,
+        noise: Annotated[
+            float | str | None, "standard deviation of a file's data, added to others [m], or 0.4um"
+        ] = None,
         seed: Annotated[int, "of that noise"] = 0,
         alpha: Annotated[float, "weight of Phi = 1/2 |D log E|^2"] = 0.0,
     ) -> None:
@@ -83,17 +94,23 @@ class VibratingBar(Transient):
             self.name,
             ("damping=rayleigh", damping == "rayleigh", True, {"c_m": c_m != 0.1, "c_k": c_k != 0.01}),
             ("damping=skew", damping == "skew", True, {"c_g": c_g != 0.1}),
+            ("data=FILE", data is not None, True, {"columns": columns, "units": units}),
+            ("data=FILE", data is not None, False, {"sensors": sensors, "seed": seed}),
+            ("unknown=moduli", unknown == "moduli", True, {"alpha": alpha}),
         )
+        if data is not None and modulus is None:
+            raise InputError(f"vibrating-bar: data={data} - say where to start: modulus=E in Pa")
+        E, sigma = 1.0 if modulus is None else modulus, standard_deviation(noise, data is not None, self.name)
         if not 1 <= n <= N_MAX or not 1 <= steps <= STEPS_MAX or 2 * n * steps > STATE_MAX:
             raise InputError(
                 f"vibrating-bar: n={n},steps={steps} - choose 1 <= n <= {N_MAX}, 1 <= steps <= {STEPS_MAX}, and"
                 f" 2 n steps <= {STATE_MAX:g}"
             )
-        sizes = {"dt": dt, "modulus": modulus, "density": density, "length": length, "area": area, "pulse": pulse}
+        sizes = {"dt": dt, "modulus": E, "density": density, "length": length, "area": area, "pulse": pulse}
         for name, size in sizes.items():
             if not 0.0 < size < math.inf:
                 raise InputError(f"vibrating-bar: {name}={size:g} - choose a finite {name} > 0")
-        for name, size in {"force": force, "c_m": c_m, "c_k": c_k, "c_g": c_g, "noise": noise}.items():
+        for name, size in {"force": force, "c_m": c_m, "c_k": c_k, "c_g": c_g}.items():
             if not math.isfinite(size) or (size < 0.0 and name != "force"):
                 raise InputError(f"vibrating-bar: {name}={size:g} - choose a finite {name} >= 0")
         if seed < 0:
@@ -104,13 +121,10 @@ class VibratingBar(Transient):
             self.stop, self.linear, self.constant = made, False, False
         self.n, self.steps, self.h, self.scheme = n, steps, dt, SCHEMES[scheme]
         self.n_state = 2 * n * steps
-        self.L_e, self.A, self.E_0 = length / n, area, modulus
-        self.log, self.noise, self.seed = parametrization == "log", noise, seed
-        self.c_M, self.c_K = (c_m, c_k) if damping == "rayleigh" else (0.0, 0.0)
+        self.L_e, self.A, self.seed = length / n, area, seed
         self.mass = np.full(n, density * area * self.L_e)  # (N,) [kg]
         self.mass[-1] /= 2.0
         self.row = self.mass[0] / dt
-        self.skew = np.full(n - 1, c_g * self.mass[0] if damping == "skew" else 0.0)  # above the diagonal [kg/s]
         t = np.arange(steps + 1) * dt
         self.F = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)  # (T + 1,) [N]
         if not self.F.any():
@@ -118,30 +132,42 @@ class VibratingBar(Transient):
                 f"vibrating-bar: force={force:g},pulse={pulse:g} acts at none of {steps} steps of dt={dt:g} and moves"
                 " nothing - choose force != 0 and dt < pulse"
             )
-        self.nodes = parse_nodes([*range(2 - n % 2, n + 1, 2)] if sensors is None else sensors, n, self.name)
-        if not len(self.nodes):
-            raise InputError("vibrating-bar: sensors=0 measure nothing - choose at least one node")
-        self.d: Array | None = None  # (T, m) [m]
+        c = {"none": {}, "rayleigh": {"c_M": c_m, "c_K": c_k}, "skew": {"c_G": c_g}}[damping]
+        self.node, self.x = (np.arange(n) + 1.0) * self.L_e, (np.arange(n) + 0.5) * self.L_e
+        speed = abs(force) / (area * math.sqrt(E * density))  # of a node that is passed by a wave of this force
+        self.unknowns = BarUnknowns.parse(
+            unknown, self.name, c, log=parametrization == "log", E=E, x=self.x, node=self.node, speed=speed
+        )
+        self.parameters = self.unknowns.parameters()
+        read = EveryStep(self.name, steps, 2 * n, dt, np.empty(0, int), lambda i: f"u_{i + 1}", sigma)
+        if data is None:
+            nodes = parse_nodes([*range(2 - n % 2, n + 1, 2)] if sensors is None else sensors, n, self.name)
+            if not len(nodes):
+                raise InputError("vibrating-bar: sensors=0 measure nothing - choose at least one node")
+            self.readings = replace(read, at=nodes - 1)
+        else:
+            self.readings, self.read_as = read_histories_of_nodes(data, read, n, columns, units)
+        self.measured = data is not None
         self._kept: tuple[Array, tuple[StepMatrix, StepMatrix]] | None = None
-        self.x = (np.arange(n) + 0.5) * self.L_e
         self.regularization = Prior(alpha)
         self.regularization.check(self.name)
-        self.parameters = Parameters(
-            start=np.full(n, math.log(modulus) if self.log else modulus),
-            scale=np.full(n, 1.0 if self.log else modulus),
-            lower=-THETA_MAX if self.log else 0.0,
-            upper=THETA_MAX if self.log else math.exp(THETA_MAX),
-            unit="log Pa" if self.log else "Pa",
-            label=(lambda e: f"log E_{e + 1}") if self.log else (lambda e: f"E_{e + 1}"),
-            position=self.x[:, None],
-        )
         self._check_stable(self.stiffness(self.parameters.start))
 
     # --- the equations
 
     def stiffness(self, p: Any, xp: Any = np) -> Any:
         """Spring constants D = E A / L_e, (N,) [N/m]."""
-        return (xp.exp(p) if self.log else p) * (self.A / self.L_e)
+        return self.unknowns.moduli(p, xp) * (self.A / self.L_e)
+
+    def initial_state(self, p: Any, xp: Any = np) -> Any:
+        return xp.concatenate([xp.zeros(self.n, dtype=p.dtype), self.unknowns.velocity(p, xp)])
+
+    def initial_by(self, p: Array) -> Array | None:
+        if "velocity" not in self.unknowns.kinds:
+            return None
+        by = np.zeros((2 * self.n, len(p)))
+        by[self.n :, self.unknowns.slice("velocity")] = np.eye(self.n)
+        return by
 
     def histories(self, states: Any) -> tuple[Any, Any]:
         """Displacements and velocities, (k, N) each, of states (k, 2 N)."""
@@ -156,21 +182,22 @@ class VibratingBar(Transient):
         h, scheme, k = self.h, self.scheme, self.stiffness(p, xp)
         moved = self.row * (x[1:] - x[:-1] - h * scheme.velocity(v))
         driven = self.mass * (v[1:] - v[:-1]) + h * scheme.force(_spread(k * _elongation(x, xp), xp))
-        if self.c_K:
-            driven = driven + h * self.c_K * scheme.damping(_spread(k * _elongation(v, xp), xp))
-        if self.c_M:
-            driven = driven + h * self.c_M * self.mass * scheme.damping(v)
-        if self.skew.any():
-            driven = driven + h * scheme.damping(self._gyroscopic(v, xp))
+        for name, c in self.unknowns.damping(p, xp).items():
+            driven = driven + h * c * scheme.damping(self._resistance(name, v, k, xp))
         pushed = -F if self.stop is None else self.stop.law.force(x[:, -1] - self.stop.gap, xp) - F
         driven = xp.concatenate([driven[:, :-1], driven[:, -1:] + h * scheme.force(pushed)[:, None]], axis=1)
         return xp.stack([moved, driven], axis=1)
 
-    def _gyroscopic(self, v: Any, xp: Any) -> Any:
-        """c_G G v, (m, N)."""
+    def _resistance(self, name: str, v: Any, k: Any, xp: Any = np) -> Any:
+        """M v, K v or G v, (m, N), by which the coefficient of damping of this name is multiplied."""
+        if name == "c_M":
+            return self.mass * v
+        if name == "c_K":
+            return _spread(k * _elongation(v, xp), xp)
         end = xp.zeros_like(v[:, :1])
-        ahead, behind = self.skew * v[:, 1:], self.skew * v[:, :-1]
-        return xp.concatenate([ahead, end], axis=1) - xp.concatenate([end, behind], axis=1)
+        return self.mass[0] * xp.concatenate([v[:, 1:], end], axis=1) - self.mass[0] * xp.concatenate(
+            [end, v[:, :-1]], axis=1
+        )
 
     def tangent(self, u: Array, p: Array) -> Recurrence:
         """Raises DomainError where an explicit step is too long for p."""
@@ -195,20 +222,20 @@ class VibratingBar(Transient):
         if self._kept is None or not np.array_equal(self._kept[0], p):
             k, s = self.stiffness(p), self.scheme
             self._check_stable(k)
-            new = self._step_matrix(k, 1.0, s.of_velocity, s.of_force, s.of_damping)
-            old = self._step_matrix(k, -1.0, 1.0 - s.of_velocity, 1.0 - s.of_force, 1.0 - s.of_damping)
+            c = self.unknowns.damping(p)
+            new = self._step_matrix(k, c, 1.0, s.of_velocity, s.of_force, s.of_damping)
+            old = self._step_matrix(k, c, -1.0, 1.0 - s.of_velocity, 1.0 - s.of_force, 1.0 - s.of_damping)
             self._kept = p.copy(), (new, old)
         return self._kept[1]
 
-    def _step_matrix(self, k: Array, sign: float, of_velocity: float, of_force: float, of_damping: float) -> StepMatrix:
-        main, h, c = np.append(k[:-1] + k[1:], k[-1]), self.h, self.h * of_damping
-        w = h * of_force
+    def _step_matrix(
+        self, k: Array, c: dict[str, Any], sign: float, of_velocity: float, of_force: float, of_damping: float
+    ) -> StepMatrix:
+        main, h = np.append(k[:-1] + k[1:], k[-1]), self.h
+        w, (c_M, c_K, c_G) = h * of_force, (h * of_damping * c.get(name, 0.0) for name in UNIT_OF)
         K = Banded(-w * k[1:], w * main, -w * k[1:])
-        D = Banded(
-            -c * (self.c_K * k[1:] + self.skew),
-            c * self.c_K * main + (sign + c * self.c_M) * self.mass,
-            -c * (self.c_K * k[1:] - self.skew),
-        )
+        skew = c_G * self.mass[0]
+        D = Banded(-c_K * k[1:] - skew, c_K * main + (sign + c_M) * self.mass, -c_K * k[1:] + skew)
         return StepMatrix(sign * self.row, -self.row * h * of_velocity, K, D)
 
     # --- one step
@@ -218,7 +245,7 @@ class VibratingBar(Transient):
         return self.impulses(*self.histories(xp.stack([v, u])), p, F, xp).ravel()
 
     def step_objective(self, t: Any, u: Any, p: Any, xp: Any = np) -> Any:
-        return 0.5 * xp.sum((u[self.nodes - 1] - xp.asarray(self.data())[t - 1]) ** 2)
+        return self.readings.step_misfit(t, u, xp)
 
     def step_tangent(self, t: int, u: Array, v: Array, p: Array) -> StepMatrix:
         return self.pressed_matrix(self.step_matrices(p)[0], u[self.n - 1])
@@ -265,114 +292,126 @@ class VibratingBar(Transient):
         return b
 
     def rates(self, t_0: int, states: Array, p: Array) -> Rates:
-        J_u, off = np.zeros_like(states[1:]), states[1:, self.nodes - 1] - self.data()[t_0 : t_0 + len(states) - 1]
-        J_u[:, self.nodes - 1] = off
-        J_p = np.broadcast_to(np.zeros_like(p), (len(J_u), len(p)))
-        R_p = self.by_modulus(*self.histories(states), p)
-        return Rates(0.5 * (off**2).sum(axis=1), J_u, J_p, R_p.each_transposed, R_p)
+        J, J_u = self.readings.step_misfits(t_0, states[1:])
+        J_p = np.broadcast_to(np.zeros_like(p), (len(J), len(p)))
+        R_p = self.by_parameters(*self.histories(states), p)
+        return Rates(J, J_u, J_p, R_p.each_transposed, R_p)
 
-    def by_modulus(self, x: Array, v: Array, p: Array) -> ImpulsesByStiffness:
+    def by_parameters(self, x: Array, v: Array, p: Array) -> ImpulsesByParameters:
         """R_p of m steps, from displacements and velocities (m + 1, N) before and after them."""
-        w = self.h * self.scheme.force(_elongation(x, np))
-        if self.c_K:
-            w += self.h * self.c_K * self.scheme.damping(_elongation(v, np))
-        return ImpulsesByStiffness(w * (self.stiffness(p) if self.log else self.A / self.L_e))
+        h, scheme, unknowns, by_p, c = (
+            self.h,
+            self.scheme,
+            self.unknowns,
+            self.unknowns.by_p(p),
+            self.unknowns.damping(p),
+        )
+        w, resistances = None, []
+        if "moduli" in unknowns.kinds:
+            w = h * scheme.force(_elongation(x, np))
+            if "c_K" in c:
+                w += h * c["c_K"] * scheme.damping(_elongation(v, np))
+            w *= by_p[unknowns.slice("moduli")] * (self.A / self.L_e)
+        if "damping" in unknowns.kinds:
+            k = self.stiffness(p)
+            resistances = [
+                h * by * scheme.damping(self._resistance(name, v, k))
+                for name, by in zip(c, by_p[unknowns.slice("damping")], strict=True)
+            ]
+        return ImpulsesByParameters(w, resistances, len(p), (len(x) - 1, self.n))
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.log_modulus(p, xp)) if self.alpha else 0.0
 
     def phi_by(self, p: Array) -> Array:
-        if not self.alpha:
+        known = self.prior(p)
+        if not self.alpha or known is None:
             return np.zeros_like(p)
-        by_theta = self.regularization.gradient(self.log_modulus(p))
-        return by_theta if self.log else by_theta / p
+        prior, theta, by_p = known
+        return np.asarray(prior.gradient(theta) * by_p)
 
     def log_modulus(self, p: Any, xp: Any = np) -> Any:
-        return p if self.log else xp.log(p)
+        return p if self.unknowns.log else xp.log(p)
 
     def traced(self) -> Traced:
         """Of all steps as arrays, which compiles faster than a step that is mapped."""
         from gradient_routes.problems.jax64 import jnp
 
         def residual(U: Any, p: Any) -> Any:
-            states = jnp.concatenate([jnp.zeros((1, self.n_step)), U.reshape(self.steps, -1)])
+            states = jnp.concatenate([self.initial_state(p, jnp)[None], U.reshape(self.steps, -1)])
             return self.impulses(*self.histories(states), p, self.F, jnp).ravel()
 
-        def objective(U: Any, p: Any) -> Any:
-            return 0.5 * jnp.sum((self._read(U, jnp) - self.data()) ** 2) + self.phi(p, jnp)
-
-        return Traced(residual, objective)
+        return Traced(residual, lambda U, p: self.readings.misfit(U, jnp) + self.phi(p, jnp))
 
     # --- data
 
-    def _read(self, u: Any, xp: Any = np) -> Any:
-        """Displacements at the sensors, (T, m) [m]."""
-        return xp.reshape(u, (self.steps, 2, self.n))[:, 0, self.nodes - 1]
-
     def observation(self, u: Array, p: Array) -> Observation:
-        from scipy import sparse
-
-        at = (2 * np.arange(self.steps)[:, None] * self.n + self.nodes - 1).ravel()
-        S = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), self.n_state))
-        m, d = len(self.nodes), self.data()
-        label = lambda k: f"u_{self.nodes[k % m]} at {(k // m + 1) * self.h:.3g} s"  # noqa: E731
-        return Observation(self._read(u).ravel(), d.ravel(), S, sigma=self.noise, label=label)
+        return self.readings.observation(u)
 
     def candidates(self) -> Candidates:
         """The displacements of every node in every step."""
-        t, i = np.divmod(np.arange(self.steps * self.n), self.n)
-        label = lambda k: f"u_{i[k] + 1} at {(t[k] + 1) * self.h:.3g} s"  # noqa: E731
-        return Candidates(2 * t * self.n + i, label, ((i + 1) * self.L_e)[:, None])
+        return self.readings.candidates(np.arange(self.n), self.node[:, None])
 
-    def prior(self, p: Array) -> tuple[Prior, Array, Array]:
-        return self.regularization, self.log_modulus(p), np.ones_like(p) if self.log else 1.0 / p
+    def prior(self, p: Array) -> tuple[Prior, Array, Array] | None:
+        if self.unknowns.kinds != ("moduli",):
+            return None
+        return self.regularization, self.log_modulus(p), np.ones_like(p) if self.unknowns.log else 1.0 / p
 
-    def data(self) -> Array:
-        """d (T, m) [m]. Raises InputError where synthetic data are not made yet."""
-        if self.d is None:
-            raise InputError(
-                "vibrating-bar: synthetic data are not made yet - solve for them:"
-                " gradient_routes.routes.synthetic_data.with_synthetic_data(bar)"
-            )
-        return self.d
-
-    def truth(self) -> Array:
-        E = self.E_0 * true_modulus(self.x / (self.n * self.L_e))
-        return np.asarray(np.log(E) if self.log else E)
+    def truth(self) -> Array | None:
+        return None if self.measured else self.unknowns.truth()
 
     def twin(self) -> VibratingBar | None:
-        return self._with_data(np.zeros((self.steps, len(self.nodes)))) if self.d is None else None
+        return self._with(self.readings.zeros()) if self.readings.d is None else None
 
     def observed(self, u: Array, seed: int | None = None) -> VibratingBar:
-        rng = np.random.default_rng(self.seed if seed is None else seed)
-        d = self._read(u)
-        return self._with_data(d + self.noise * rng.standard_normal(d.shape))
+        return self._with(self.readings.synthesized(u, self.seed if seed is None else seed))
 
-    def _with_data(self, d: Array) -> VibratingBar:
+    def _with(self, readings: EveryStep) -> VibratingBar:
         other = copy.copy(self)
-        other.d = d
+        other.readings = readings
         return other
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
-        return ParameterView({"x": self.x, "E": self.stiffness(p) * self.L_e / self.A})
+        shares = super().view(p, u, lam)
+        if self.unknowns.kinds != ("moduli",):
+            return shares
+        return replace(shares, columns={"x": self.x, "E": self.unknowns.moduli(p), **shares.columns})
 
 
-class ImpulsesByStiffness:
-    """R_p of k steps, (k 2 N, N): column e the impulses [N s] of element e, stretched by w (k, N)."""
+class ImpulsesByParameters:
+    """R_p of k steps, (k 2 N, n_p), of p = (moduli, damping, velocities).
 
-    def __init__(self, w: Array) -> None:
-        self.w = w
+    w            (k, N): column e of the moduli is the impulses [N s] of element e, stretched by w
+    resistances  (k, N) [N s] each, of the coefficients of damping
+    """
+
+    def __init__(self, w: Array | None, resistances: Sequence[Array], n_p: int, shape: tuple[int, int]) -> None:
+        self.w, self.resistances, self.n_p, self.shape = w, resistances, n_p, shape
+        self.first = 0 if w is None else w.shape[1]
 
     @property
     def T(self) -> ByProducts:
-        return ByProducts(lambda lam: self.each_transposed(lam.reshape(len(self.w), -1)).sum(axis=0), self.__matmul__)
+        return ByProducts(lambda lam: self.each_transposed(lam.reshape(len(self), -1)).sum(axis=0), self.__matmul__)
+
+    def __len__(self) -> int:
+        return self.shape[0]
 
     def __matmul__(self, dp: Array) -> Array:
-        driven = _spread(self.w * dp, np)
+        driven = np.zeros(
+            self.shape, np.result_type(dp, *(part for part in (self.w, *self.resistances) if part is not None))
+        )
+        if self.w is not None:
+            driven += _spread(self.w * dp[: self.first], np)
+        for resistance, dc in zip(self.resistances, dp[self.first :], strict=False):
+            driven += resistance * dc
         return np.concatenate([np.zeros_like(driven), driven], axis=1).ravel()
 
     def each_transposed(self, lam: Array) -> Array:
-        return np.asarray(self.w * _elongation(lam[:, self.w.shape[1] :], np))
+        impulses = lam[:, self.shape[1] :]
+        parts = [] if self.w is None else [self.w * _elongation(impulses, np)]
+        parts += [(resistance * impulses).sum(axis=1, keepdims=True) for resistance in self.resistances]
+        known = sum(part.shape[1] for part in parts)
+        return np.concatenate([*parts, np.zeros((len(lam), self.n_p - known), lam.dtype)], axis=1)
 
 
 def _elongation(x: Any, xp: Any) -> Any:

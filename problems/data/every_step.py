@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.data.observation import Candidates, Observation
+from gradient_routes.problems.data.sensors import level
+from gradient_routes.problems.data.table import Group, read_table
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array
 
 Label = Callable[[int], str]
+TIME = Group(("t",), "time", marked=False)
+NODE = Group(("node",), "number", marked=False)
+DISPLACEMENT = Group(("displacement",), "length")
+NOISE = Group(("sigma",), "length", need="none")
+NEAR = 1e-6  # of a step, within which a time is that of a step: files have some six digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +30,7 @@ class EveryStep:
     at (m,)    the unknowns that are read
     name       of an unknown, for tables
     d (T, m)   None for synthetic data that are not computed yet
+    w (T, m)   1 where something was measured, 0 where not; None: everywhere
     noise      standard deviation of the noise on d
     """
 
@@ -33,6 +42,7 @@ class EveryStep:
     name: Label
     noise: float = 0.0
     d: Array | None = None
+    w: Array | None = None
 
     @property
     def data(self) -> Array:
@@ -58,24 +68,31 @@ class EveryStep:
         return xp.reshape(u, (self.steps, self.n))[:, self.at]
 
     def misfit(self, u: Any, xp: Any = np) -> Any:
-        return 0.5 * xp.sum((self.read(u, xp) - self.data) ** 2)
+        return 0.5 * xp.sum(self._off(self.read(u, xp), slice(None), xp) ** 2)
 
     def step_misfit(self, t: Any, u: Any, xp: Any = np) -> Any:
         """That of the state u (n,) after step t, which is traced where xp is jax.numpy."""
-        return 0.5 * xp.sum((u[self.at] - xp.asarray(self.data)[t - 1]) ** 2)
+        return 0.5 * xp.sum(self._off(u[self.at], t - 1, xp) ** 2)
 
     def step_misfits(self, t_0: int, u: Array) -> tuple[Array, Array]:
         """Those of the states u (k, n) after steps t_0 + 1..t_0 + k, (k,), and S^T (S u - d), (k, n)."""
-        off, by_u = u[:, self.at] - self.data[t_0 : t_0 + len(u)], np.zeros_like(u)
+        off, by_u = self._off(u[:, self.at], slice(t_0, t_0 + len(u))), np.zeros_like(u)
         by_u[:, self.at] = off
         return 0.5 * (off**2).sum(axis=1), by_u
+
+    def _off(self, read: Any, rows: Any, xp: Any = np) -> Any:
+        """S u - d of steps `rows`, counted from 0; 0 where nothing was measured."""
+        off = read - xp.asarray(self.data)[rows]
+        return off if self.w is None else xp.asarray(self.w)[rows] * off
 
     def observation(self, u: Array) -> Observation:
         from scipy import sparse
 
-        at = self._of_all_steps(self.at)
+        kept = np.flatnonzero(np.ones(self.data.size) if self.w is None else self.w.ravel())
+        at = self._of_all_steps(self.at)[kept]
         S = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), self.steps * self.n))
-        return Observation(self.read(u).ravel(), self.data.ravel(), S, sigma=self.noise, label=self._label(at))
+        read, d = self.read(u).ravel()[kept], self.data.ravel()[kept]
+        return Observation(read, d, S, sigma=self.noise, label=self._label(at))
 
     def candidates(self, at: Array, position: Array) -> Candidates:
         """The unknowns `at` (m,) at positions (m, d) in every step."""
@@ -87,3 +104,39 @@ class EveryStep:
 
     def _label(self, at: Array) -> Label:
         return lambda k: f"{self.name(int(at[k] % self.n))} at {(at[k] // self.n + 1) * self.h:.3g} s"
+
+
+def read_histories_of_nodes(
+    path: str | Path, readings: EveryStep, n: int, columns: str | None, units: str | None
+) -> tuple[EveryStep, tuple[str, ...]]:
+    """Data of nodes 1..n after some steps, from columns t,node,displacement, and sigma where there is one.
+
+    Raises InputError for what cannot be read, nodes that do not exist, times that are no steps, and times of one node
+    that do not increase.
+    """
+    table = read_table(path, (TIME, NODE, DISPLACEMENT, NOISE), columns, units)
+    t, node, h, steps = table.columns["t"], table.columns["node"], readings.h, readings.steps
+    step = np.rint(t / h).astype(int)
+    whats = {
+        f"there is no such node, they are 1..{n}": (node < 1) | (node > n) | (node != np.rint(node)),
+        f"this is no step, they are {h:g} s apart - choose dt": np.abs(t / h - step) > NEAR,
+        f"this is none of the {steps} steps of {h:g} s - take more, or leave the row out": (step < 1) | (step > steps),
+    }
+    for what, wrong in whats.items():
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            raise InputError(f"{path}: line {table.lines[k]}: node {node[k]:g}, t = {t[k]:g} s: {what}")
+    nodes, sensor = np.unique(node.astype(int), return_inverse=True)
+    order = np.argsort(sensor, kind="stable")
+    back = np.flatnonzero((np.diff(sensor[order]) == 0) & (np.diff(step[order]) <= 0))
+    if back.size:
+        before, k = order[back[0]], order[back[0] + 1]
+        raise InputError(
+            f"{path}: line {table.lines[k]}: t = {t[k]:g} s of node {node[k]:g} follows {t[before]:g} s in line"
+            f" {table.lines[before]} - sort the rows of each node by time, each once"
+        )
+    d, w = np.zeros((steps, len(nodes))), np.zeros((steps, len(nodes)))
+    d[step - 1, sensor], w[step - 1, sensor] = table.columns["displacement"], 1.0
+    noise = level(table, readings.noise, readings.who)
+    full = None if w.all() else w
+    return replace(readings, at=nodes - 1, d=d, w=full, noise=noise), tuple(filter(None, (table.said,)))

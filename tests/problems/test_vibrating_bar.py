@@ -45,11 +45,11 @@ def test_the_motion_converges_to_that_of_a_fine_integrator(scheme: str, order: f
     """SciPy's DOP853 on M u'' + C u' + K u = f(t), whose matrices are written out here. Damping by the new velocity
     makes central differences first-order accurate."""
     n, end, off = 3, 1.2, []
-    bar = made(n=n, steps=30, dt=end / 30, **DAMPINGS[damping])
     k, m = np.full(n, float(n)), np.array([1.0, 1.0, 0.5]) / n
     B = np.eye(n) - np.eye(n, k=-1)
     K, G = B.T @ np.diag(k) @ B, np.eye(n, k=1) - np.eye(n, k=-1)
-    C = bar.c_M * np.diag(m) + bar.c_K * K + (2.0 * m[0] * G if damping == "skew" else 0.0)
+    c = {"none": (0.0, 0.0, 0.0), "rayleigh": (0.3, 0.02, 0.0), "skew": (0.0, 0.0, 2.0)}[damping]
+    C = c[0] * np.diag(m) + c[1] * K + c[2] * m[0] * G
 
     def rate(t: float, z: Any) -> Any:
         f = np.zeros(n)
@@ -88,6 +88,74 @@ def test_every_route_gives_the_gradient_of_complex_steps(scheme: str, damping: s
     for route in ROUTES:
         found = route.prepare(model, p)(p)
         assert relative_error(found.gradient, exact) < (route.accuracy or 1e-12), route.name
+
+
+@pytest.mark.parametrize("unknown", ["moduli,damping,velocity", "damping", "velocity"])
+def test_damping_and_the_initial_velocity_are_sought_like_moduli(unknown: str) -> None:
+    """By all routes, with stiffness in the damping; the velocities are all of the share of the initial state."""
+    bar = made(n=3, steps=4, unknown=unknown, **DAMPINGS["rayleigh"])
+    model, rng = Model(bar), np.random.default_rng(0)
+    p = bar.parameters.start + 0.1 * rng.standard_normal(len(bar.parameters))
+    exact = complex_step.prepare(model, p)(p).gradient
+    assert abs(exact).min() > 0.0
+    for route in ROUTES:
+        found = route.prepare(model, p)(p)
+        assert relative_error(found.gradient, exact) < (route.accuracy or 1e-12), route.name
+    few = adjoint.prepare(model, p, checkpoint="revolve=2")(p)
+    assert relative_error(few.gradient, exact) < 1e-12
+    state = adjoint.prepare(model, p)(p)
+    shares = bar.view(p, state.u, state.lam).columns
+    if "velocity" in unknown:
+        v = bar.unknowns.slice("velocity")
+        np.testing.assert_allclose(shares["by u_0"][v], exact[v], rtol=1e-11)
+        np.testing.assert_array_equal(shares["by rates"][v], 0.0)
+        assert not shares["by u_0"][: v.start].any()
+    else:
+        assert "by u_0" not in shares
+
+
+def test_skew_damping_is_sought_too() -> None:
+    bar = made(n=3, steps=4, unknown="damping", damping="skew", parametrization="raw")
+    p = np.array([0.7])
+    exact = complex_step.prepare(Model(bar), p)(p).gradient
+    assert relative_error(adjoint.prepare(Model(bar), p)(p).gradient, exact) < 1e-12
+
+
+FILE = "t [ms],node,displacement [mm]\n100,4,1\n200,4,3\n100,2,0.5\n400,2,2\n"
+
+
+def test_histories_of_a_file_are_weighed_where_they_are(tmp_path) -> None:
+    (tmp_path / "d.csv").write_text(FILE)
+    bar = VibratingBar(n=4, steps=5, dt=0.1, data=str(tmp_path / "d.csv"), modulus=2.0, noise="0.1mm")
+    U = np.random.default_rng(0).standard_normal(bar.n_state)
+    u = U.reshape(5, 2, 4)[:, 0]
+    off = [u[0, 3] - 1e-3, u[1, 3] - 3e-3, u[0, 1] - 0.5e-3, u[3, 1] - 2e-3]
+    p = bar.parameters.start
+    assert bar.objective(U, p) == pytest.approx(0.5 * np.sum(np.square(off)), rel=1e-14)
+    seen = bar.observation(U, p)
+    np.testing.assert_allclose(np.sort(seen.predicted - seen.data), np.sort(off), rtol=1e-14)
+    assert seen.sigma == pytest.approx(1e-4)
+    model = Model(bar)
+    exact = complex_step.prepare(model, p)(p).gradient
+    for route in (adjoint, implicit_ad):
+        assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("0.1,9,1\n", r"line 2: node 9, t = 0.1 s: there is no such node, they are 1..4"),
+        ("0.13,1,1\n", r"t = 0.13 s: this is no step, they are 0.1 s apart - choose dt"),
+        ("0.9,1,1\n", "this is none of the 5 steps"),
+        ("0,1,1\n", "this is none of the 5 steps"),
+        ("0.2,1,1\n0.1,1,2\n", "line 3: t = 0.1 s of node 1 follows 0.2 s in line 2 - sort"),
+        ("0.2,1,1\n0.2,1,2\n", "each once"),
+    ],
+)
+def test_histories_that_do_not_fit_the_march_are_refused(rows: str, says: str, tmp_path) -> None:
+    (tmp_path / "d.csv").write_text("t,node,displacement\n" + rows)
+    with pytest.raises(InputError, match=says):
+        VibratingBar(n=4, steps=5, dt=0.1, data=str(tmp_path / "d.csv"), modulus=1.0)
 
 
 STOPPED = {
@@ -217,6 +285,10 @@ def test_an_explicit_step_beyond_its_limit_is_refused() -> None:
         ({"sensors": "9"}, "there are 4"),
         ({"noise": -1.0}, "noise=-1"),
         ({"sensors": 0}, "sensors=0 measure nothing"),
+        ({"unknown": "mass"}, "unknown=mass - choose among moduli, damping, velocity"),
+        ({"unknown": "damping"}, "there is no damping - choose damping=rayleigh or skew"),
+        ({"unknown": "velocity", "alpha": 1.0}, "alpha"),
+        ({"data": "d.csv"}, "data=d.csv - say where to start: modulus=E in Pa"),
         ({"dt": 0.5}, "pulse=0.5 acts at none of 12 steps of dt=0.5 and moves nothing"),
         ({"force": 0.0}, "force=0,pulse=0.5 acts at none"),
     ],
