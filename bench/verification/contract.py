@@ -11,8 +11,10 @@ import numpy as np
 from gradient_routes.bench.verification.factors import ASKED, CONVERGED, EXACT, Factors, relative
 from gradient_routes.bench.verification.finding import Finding
 from gradient_routes.bench.verification.guarded import FOREIGN, one_line
+from gradient_routes.bench.verification.steps import of_steps
 from gradient_routes.problems.errors import InputError, RoutesError
 from gradient_routes.problems.problem import Array, Offers, Problem
+from gradient_routes.problems.transient import Transient
 from gradient_routes.routes.forward_work import ForwardWork
 from gradient_routes.routes.imaginary import losses
 from gradient_routes.routes.model import Model
@@ -76,6 +78,8 @@ def _of_problem(problem: Problem, p: Array, routes: Sequence[Route], solver: Sol
             yield _claim(f"{name} keeps imaginary parts (COMPLEX)", name not in lost, lost.get(name, ""))
     if Offers.LINEARIZE in problem.offers:
         yield from Factors(problem, u, q).findings()
+        if isinstance(problem, Transient):
+            yield from of_steps(problem, u, q)
     yield from _structure(problem, u, q)
     if Offers.TRACE in problem.offers:
         yield from _traced(problem, u, q)
