@@ -67,7 +67,7 @@ class Heat(FirstOrder):
         ] = "all",
         source: Annotated[float | None, "f in the body [W/m3], if unknown the start [0, if unknown 1e5]"] = None,
         base: Annotated[
-            float | str | None, "T at x=0 [K], or 100degC; none: x=0 is like other sides [373.15; see data]"
+            float | str | None, "T at x=0 [K], or 100degC; free: x=0 is like other sides [373.15; see data]"
         ] = None,
         ambient: Annotated[float | str | None, "T_inf of the surroundings [K], or 20degC [293.15; see data]"] = None,
         initial: Annotated[float | str | None, "T_0 at first [K], or 20degC, if unknown the start [ambient]"] = None,
