@@ -211,7 +211,10 @@ def test_units_of_a_file_and_a_file_in_si_are_one_problem(file: str, tmp_path: P
     one, other = (recorded(path) for path in (file, str(tmp_path / "si.csv")))
     p = one.parameters.start
     assert Model(other).value(p) == pytest.approx(Model(one).value(p), rel=1e-12)
-    assert one.notes == ("read t in min, factor 60 / x, y in mm, factor 0.001 / T in degC, plus 273.15",)
+    assert one.notes == (
+        "read t in min, factor 60 / x, y in mm, factor 0.001 / T in degC, plus 273.15",
+        "start: diffusivity=6.667e-05, initial=293.5",  # L^2 over 150 s, and the first datum
+    )
     assert one.h == pytest.approx(30.0)  # to the last datum
 
 
@@ -220,7 +223,7 @@ def test_without_y_sensors_lie_half_way_up(tmp_path: Path) -> None:
     heat = Heat(
         **STATED | {"base": 373.15, "ambient": 293.15}, n=2, ny=1, initial=293.15, steps=2, data=str(tmp_path / "x.csv")
     )
-    assert heat.notes == ("no column y: sensors at y = 0.05 m",)
+    assert heat.notes[0] == "no column y: sensors at y = 0.05 m"
     assert not heat.held  # all data are of steps: no unknowns are added
 
 
