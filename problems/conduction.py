@@ -5,6 +5,8 @@ rho c T' - div(k grad T) = f,    k dT/dn = h (T_inf - T) on the sides,    T = T_
 
 from __future__ import annotations
 
+import copy
+import math
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -46,6 +48,7 @@ class Heat(FirstOrder):
     typical = 0
     from_rest = True
     regularization: Prior
+    _recorded: tuple[Array, Array] | None = None  # t [s], T [K] of a file
 
     def __init__(
         self,
@@ -67,7 +70,7 @@ class Heat(FirstOrder):
         ] = "all",
         source: Annotated[float | None, "f in the body [W/m3], if unknown the start [0, if unknown 1e5]"] = None,
         base: Annotated[
-            float | str | None, "T at x=0 [K], or 100degC; none: x=0 is like other sides [373.15; see data]"
+            float | str | None, "T at x=0 [K], or 100degC; free: x=0 is like other sides [373.15; see data]"
         ] = None,
         ambient: Annotated[float | str | None, "T_inf of the surroundings [K], or 20degC [293.15; see data]"] = None,
         initial: Annotated[float | str | None, "T_0 at first [K], or 20degC, if unknown the start [ambient]"] = None,
@@ -118,7 +121,8 @@ class Heat(FirstOrder):
             self.histories = Histories.at_times(read.sensor, read.t, read.T - body.T_inf, h, steps)
             placed, between, self.measured = read.placed, self.histories.between, True
             self.noise = read.sigma
-            sizes = body.sizes(given, names, read.t, read.T)
+            self._recorded = read.t, read.T
+            sizes = body.sizes(given, names, *self._recorded)
             self.read_as = (*read.notes, f"start: {', '.join(f'{name}={sizes[name]:.4g}' for name in names)}")
         dofs = np.where(self.solid.free, np.cumsum(self.solid.free) - 1, -1)[placed.nodes]
         probe = Probe(dofs, placed.N, placed.x, body.excess)
@@ -217,6 +221,21 @@ class Heat(FirstOrder):
 
     def candidates(self) -> Candidates:
         return self.candidates_at(self.solid.mesh.geometry.X[self.solid.free])
+
+    def told_by_data(self, p: Array) -> tuple[Heat, float] | None:
+        """As where no start is stated, see `Body.sizes`; a temperature has no factor to be off by."""
+        each = [c for c in self.unknowns.each if c.of.positive]
+        if self._recorded is None or not each:
+            return None
+        names = [c.name for c in self.unknowns.each]
+        unstated = self._given | dict.fromkeys(["conductivity" if name == "diffusivity" else name for name in names])
+        other = copy.copy(self)
+        other.sizes = self.body.sizes(unstated, names, *self._recorded)
+        log = self._given["parametrization"] == "log"
+        other.unknowns = Unknowns.of(names, other.sizes, self.parts, log)
+        other.parameters = other.unknowns.parameters(np.array(self.body.size))
+        ratios = [float(np.mean(c.value(p))) / other.sizes[c.name] for c in each]
+        return other, max(max(r, 1.0 / r) if r > 0.0 else math.inf for r in ratios)
 
     def truth(self) -> Array | None:
         return None if self.measured else self.unknowns.truth

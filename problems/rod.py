@@ -252,7 +252,8 @@ class Rod(Problem):
         sizes = self.fin.sizes([c.name for c in each], self.sizes, self.sensors.x, self._data())
         other = copy.copy(self)
         log = given["parametrization"] == "log"
-        other.sizes, other.unknowns = sizes, Unknowns.of([c.name for c in each], sizes, given["parts"], log)
+        other.sizes = sizes
+        other.unknowns = Unknowns.of([c.name for c in each], sizes, {c.name: c.parts for c in each}, log)
         other.parameters = other.unknowns.parameters(self.fin.L)
         ratios = [float(np.mean(c.value(p))) / sizes[c.name] for c in each]
         return other, max(max(r, 1.0 / r) if r > 0.0 else math.inf for r in ratios)

@@ -52,10 +52,10 @@ def march_back(model: Model, p: Array, checkpoint: str, derivatives: Derivatives
         for J_t, g_t in zip(rates.J[::-1], by_p[::-1], strict=True):  # one by one, whatever steps come together
             J, gradient = J + J_t, gradient + g_t
         left = max(left, norm(problem.rows(t_0, states, p)))
-    gradient = gradient + of.pulled_to_initial(mu, p)
+    initial = of.pulled_to_initial(mu, p)
     model.tally.count("transposed_solves")
     model.tally.count("residuals")
-    return Result(float(J), gradient, residual=left / (march.scale or 1.0))
+    return Result(float(J), gradient + initial, residual=left / (march.scale or 1.0), initial=initial)
 
 
 def march_work(forward: ForwardWork, checkpoint: str) -> Work:

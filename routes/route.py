@@ -26,6 +26,7 @@ class Result(NamedTuple):
     tape      bytes held between the forward and the backward sweep of AD
     du_dp     (n_u, k), columns of du/dp that were asked for
     peer      of another code's gradient: its name and versions, and the seconds and bytes that it measured itself
+    initial   (n_p,), what of the gradient of a march is by its initial state, where the route tells it apart
     """
 
     J: float | None
@@ -36,6 +37,7 @@ class Result(NamedTuple):
     tape: int | None = None
     du_dp: Array | None = None
     peer: Mapping[str, Any] | None = None
+    initial: Array | None = None
 
 
 Gradient = Callable[[Array], Result]

@@ -79,7 +79,7 @@ class Body:
             raise InputError(f"heat: n={n},ny={ny} - choose cells along x and y >= 1, at most {CELLS_MAX:g} in all")
         if parts < 1 or n % parts or (ny > 1 and ny % parts):
             raise InputError(f"heat: parts={parts} with {n} x {ny} cells - choose parts that divide both")
-        prescribed = given["base"] != "none"
+        prescribed = given["base"] != "free"
         exposed = _exposed(str(given["exposed"]), prescribed)
         if given["data"] is not None:
             _check_stated(given, names, bool(exposed))
@@ -127,7 +127,7 @@ def _exposed(text: str, prescribed: bool) -> tuple[str, ...]:
     if unknown:
         raise InputError(f"heat: exposed={text}: no side '{unknown[0]}' - choose {', '.join(AROUND)}, all or none")
     if prescribed and text != "all" and "left" in sides:
-        raise InputError(f"heat: exposed={text}, and T is given at x=0 - leave left out, or take base=none")
+        raise InputError(f"heat: exposed={text}, and T is given at x=0 - leave left out, or take base=free")
     return tuple(side for side in AROUND if side in sides and not (prescribed and side == "left"))
 
 

@@ -119,7 +119,7 @@ def _around(x: Array) -> Array:
 def _sides(s: Array, exposed: Sequence[str], grid: tuple[int, int]) -> tuple[Parts, Array]:
     """The parts of these sides, one for all where the grid is one, and that of each edge at s (n_f,)."""
     if max(grid) == 1 or not len(s):
-        return Parts.point(), np.zeros(len(s), dtype=int)
+        return Parts.grid((1, 1)), np.zeros(len(s), dtype=int)
     count = np.array(grid)[[0, 1, 0, 1]]  # of every side
     side, i = np.array([(k, i) for k in range(4) if AROUND[k] in exposed for i in range(count[k])]).T
     of_edge = s.astype(int)

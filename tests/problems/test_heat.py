@@ -68,7 +68,7 @@ def test_a_mode_decays_as_its_closed_form(scheme: Any) -> None:
     other. Means of parts are the mode times cos(pi h/2)^2.
     """
     n, dt, a = 4, 60.0, 50.0 / (7800.0 * 470.0)
-    heat = Heat(n=n, steps=6, dt=dt, base="none", exposed="none", unknown="initial", parts=n, scheme=scheme, size=1.0)
+    heat = Heat(n=n, steps=6, dt=dt, base="free", exposed="none", unknown="initial", parts=n, scheme=scheme, size=1.0)
     x, y = heat.parameters.position.T
     u = marched(heat.twin(), heat.body.T_inf + 1e3 * np.cos(np.pi * x) * np.cos(np.pi * y))
     x, y = heat.solid.mesh.geometry.X.T
@@ -104,14 +104,14 @@ def test_the_march_converges_to_that_of_a_fine_integrator(scheme: Any, order: fl
 
 
 def test_a_source_heats_an_insulated_body_evenly() -> None:
-    heat = Heat(n=2, ny=4, size="0.2,0.1", steps=3, dt="0.5min", base="none", exposed="none", unknown="source")
+    heat = Heat(n=2, ny=4, size="0.2,0.1", steps=3, dt="0.5min", base="free", exposed="none", unknown="source")
     u = marched(heat.twin())
     np.testing.assert_allclose(u, np.outer(1e5 / (7800.0 * 470.0) * 30.0 * np.arange(1, 4), np.ones(15)), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["diffusivity", "film", "source", "initial"])
 def test_the_gradient_of_parts_adds_up_to_that_of_the_whole(name: Any) -> None:
-    options = {"n": 2, "steps": 3, "base": "none", "initial": 350.0, "source": 1e5, "unknown": name}
+    options = {"n": 2, "steps": 3, "base": "free", "initial": 350.0, "source": 1e5, "unknown": name}
     whole, parted = (with_synthetic_data(Heat(**options)), Heat(**options, parts=2))
     parted.histories = whole.histories
     one, many = (adjoint.prepare(Model(heat), p)(p) for heat in (whole, parted) for p in [heat.parameters.start])
@@ -137,7 +137,7 @@ def test_every_route_gives_the_gradient_of_complex_steps(file: str) -> None:
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "film": {"unknown": "film+initial", "parts": 2, "alpha": 10.0, "parametrization": "raw"},
-    "source": {"unknown": "diffusivity+source", "scheme": "crank-nicolson", "base": "none"},
+    "source": {"unknown": "diffusivity+source", "scheme": "crank-nicolson", "base": "free"},
     "variation": {"unknown": "film+source", "parts": 2, "alpha": 10.0, "phi": "tv"},
 }
 
@@ -211,7 +211,10 @@ def test_units_of_a_file_and_a_file_in_si_are_one_problem(file: str, tmp_path: P
     one, other = (recorded(path) for path in (file, str(tmp_path / "si.csv")))
     p = one.parameters.start
     assert Model(other).value(p) == pytest.approx(Model(one).value(p), rel=1e-12)
-    assert one.notes == ("read t in min, factor 60 / x, y in mm, factor 0.001 / T in degC, plus 273.15",)
+    assert one.notes == (
+        "read t in min, factor 60 / x, y in mm, factor 0.001 / T in degC, plus 273.15",
+        "start: diffusivity=6.667e-05, initial=293.5",  # L^2 over 150 s, and the first datum
+    )
     assert one.h == pytest.approx(30.0)  # to the last datum
 
 
@@ -220,7 +223,7 @@ def test_without_y_sensors_lie_half_way_up(tmp_path: Path) -> None:
     heat = Heat(
         **STATED | {"base": 373.15, "ambient": 293.15}, n=2, ny=1, initial=293.15, steps=2, data=str(tmp_path / "x.csv")
     )
-    assert heat.notes == ("no column y: sensors at y = 0.05 m",)
+    assert heat.notes[0] == "no column y: sensors at y = 0.05 m"
     assert not heat.held  # all data are of steps: no unknowns are added
 
 

@@ -63,6 +63,8 @@ def test_the_shares_are_their_closed_forms(of: tuple[str, ...]) -> None:
     by_rate = -(u - D) * u * T * H / (1.0 + H * r) if "rate" in of else 0.0
     found = adjoint.prepare(Model(problem), p)(p)
     assert found.gradient == pytest.approx([by_height + by_rate], rel=1e-13)
+    few = adjoint.prepare(Model(problem), p, checkpoint="sqrt")(p)
+    assert few.initial == pytest.approx([by_height], rel=1e-13)
     shown = problem.view(p, found.u, found.lam).columns
     if "height" not in of:
         assert shown == {}
@@ -74,9 +76,9 @@ def test_the_shares_are_their_closed_forms(of: tuple[str, ...]) -> None:
 def test_rows_and_tables_tell_the_shares_where_the_initial_state_depends_on_p(cli: Any) -> None:
     both, rates = "heat[n=2,steps=2,unknown=diffusivity+initial]", "heat[n=2,steps=2]"
     options = ("--route", "adjoint", "--no-timing", "--no-store")
-    (row,) = cli("run", "--json", "--problem", both, *options).rows
-    assert (row["gradient_initial"][0], row["gradient_rates"][1]) == (0.0, 0.0)
-    assert np.add(row["gradient_initial"], row["gradient_rates"]) == pytest.approx(row["gradient"], rel=1e-15)
+    for row in cli("run", "--json", "--problem", both, "--route", "adjoint[checkpoint=sqrt]", *options).rows:
+        assert (row["gradient_initial"][0], row["gradient_rates"][1]) == (0.0, 0.0)
+        assert np.add(row["gradient_initial"], row["gradient_rates"]) == pytest.approx(row["gradient"], rel=1e-15)
     (row,) = cli("run", "--json", "--problem", rates, *options).rows
     assert row["gradient_initial"] is row["gradient_rates"] is None
     shown = cli("run", "--gradient", "--problem", both, *options).out

@@ -103,7 +103,7 @@ WRONG = {
     "--inner newton": "'newton'",
     "--inner direct --checkpoint 4": "inner=direct",
     "--problem block[n=1] --inner jacobi": "is nonlinear - take inner=cg",
-    "--problem all": "names 9 problems",
+    "--problem all": "names 10 problems",
 }
 
 
