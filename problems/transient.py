@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from gradient_routes.problems.problem import (
 from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
 
+if TYPE_CHECKING:
+    from gradient_routes.problems.mechanics.global_step import GlobalStep
+
 CACHED = 2048  # numbers of an array of states that stay in a cache with a dozen others like it
 
 
@@ -35,9 +38,13 @@ class Transient(Problem):
 
     steps     T
     constant  R_t is affine in u_t and u_{t-1}, with the same R_u and R_v for all t
+    projective   it has a `global_step`, whose states are (u, v)
+    of_velocity  du/dv in a step of these, at rows of u that stay satisfied: h/2
     """
 
     constant: bool = False
+    projective: bool = False
+    of_velocity: float = 0.0
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -73,6 +80,10 @@ class Transient(Problem):
     def step_active_set(self, t: int, u: Array, p: Array) -> Hashable | None:
         """See `Problem.active_set`."""
         return None
+
+    def global_step(self, p: Array) -> GlobalStep:
+        """A constant matrix in place of D - b/a K of the step's R_u = [[a I, b I], [K, D]]."""
+        raise NotOffered(f"{self.name}: offers no constant matrix for its steps")
 
     def initial_state(self, p: Any, xp: Any = np) -> Any:
         """u_0 (n,), of p's dtype: rest."""
