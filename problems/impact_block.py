@@ -23,11 +23,12 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions
 from gradient_routes.problems.fem.elements import SolidElement
 from gradient_routes.problems.fem.mesh import AXES
+from gradient_routes.problems.matrices.global_step import GlobalStep
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.sparse import SymmetricSparse
 from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.mechanics import solid_options as options
-from gradient_routes.problems.mechanics.global_step import GlobalStep
+from gradient_routes.problems.mechanics.global_step import global_step
 from gradient_routes.problems.mechanics.mass import Mass, element_masses
 from gradient_routes.problems.mechanics.rigid_plane import RigidPlane
 from gradient_routes.problems.problem import (
@@ -167,7 +168,7 @@ class ImpactBlock(Transient):
 
     def global_step(self, p: Array) -> GlobalStep:
         c, plane = self.h**2 / 4.0, self.plane
-        return GlobalStep.of(self.solid, p, c, self.masses, plane.at, lambda u: c * plane.stiffness(u)[plane.at])
+        return global_step(self.solid, p, c, self.masses, plane.at, lambda u: c * plane.stiffness(u)[plane.at])
 
     def initial_state(self, p: Any, xp: Any = np) -> Any:
         return xp.concatenate([xp.zeros(self.n), xp.asarray(self.v_0)]).astype(p.dtype)

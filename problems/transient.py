@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.matrices.by_products import ByProducts
+from gradient_routes.problems.matrices.global_step import GlobalStep
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.problem import (
     Array,
@@ -22,9 +23,6 @@ from gradient_routes.problems.problem import (
 )
 from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
-
-if TYPE_CHECKING:
-    from gradient_routes.problems.mechanics.global_step import GlobalStep
 
 CACHED = 2048  # numbers of an array of states that stay in a cache with a dozen others like it
 

@@ -10,43 +10,32 @@ picks the displacements `at`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
+from gradient_routes.problems.matrices.global_step import GlobalStep
+from gradient_routes.problems.matrices.sparse import SymmetricPattern
 from gradient_routes.problems.mechanics.loaded_solid import LoadedSolid
 from gradient_routes.problems.problem import Array
 
 
-@dataclass(frozen=True, eq=False)
-class GlobalStep:
-    """A (n/d, n/d) of nodes whose d displacements are all free; at (m,) of n unknowns, stiffness(u) -> k (m,)."""
-
-    A: SymmetricSparse
-    d: int
-    at: Array
-    stiffness: Callable[[Array], Array]
-
-    @classmethod
-    def of(
-        cls,
-        solid: LoadedSolid,
-        p: Array,
-        c: float,
-        masses: Array | float,
-        at: Array,
-        stiffness: Callable[[Array], Array],
-    ) -> GlobalStep:
-        """Of the law arap in one load case, with masses (n_e, n_a, n_a) [kg] of the cells."""
-        geometry, d = solid.mesh.geometry, solid.mesh.geometry.dim
-        first, (mu, lam), (dN, dx) = solid.bc.index[0, :, 0], solid.setup(p).q, geometry.metric
-        dofs = np.where(first < solid.bc.n_free, first // d, -1)[geometry.nodes]
-        w = (2.0 * mu + 0.5 * lam)[..., None] * dx if np.ndim(mu) else (2.0 * mu + 0.5 * lam) * dx
-        if len(dN) == 1:
-            laplacian = np.einsum("eq,qab->eab", w, np.einsum("qaj,qbj->qab", dN[0], dN[0]))
-        else:
-            laplacian = np.einsum("eq,eqaj,eqbj->eab", w, dN, dN)
-        i, j = np.triu_indices(dofs.shape[1])
-        pattern = SymmetricPattern.of_elements(dofs, solid.bc.n_free // d)
-        return cls(pattern.assemble((masses + c * laplacian)[:, i, j]), d, at, stiffness)
+def global_step(
+    solid: LoadedSolid,
+    p: Array,
+    c: float,
+    masses: Array | float,
+    at: Array,
+    stiffness: Callable[[Array], Array],
+) -> GlobalStep:
+    """Of the law arap in one load case, with masses (n_e, n_a, n_a) [kg] of the cells."""
+    geometry, d = solid.mesh.geometry, solid.mesh.geometry.dim
+    first, (mu, lam), (dN, dx) = solid.bc.index[0, :, 0], solid.setup(p).q, geometry.metric
+    dofs = np.where(first < solid.bc.n_free, first // d, -1)[geometry.nodes]
+    w = (2.0 * mu + 0.5 * lam)[..., None] * dx if np.ndim(mu) else (2.0 * mu + 0.5 * lam) * dx
+    if len(dN) == 1:
+        laplacian = np.einsum("eq,qab->eab", w, np.einsum("qaj,qbj->qab", dN[0], dN[0]))
+    else:
+        laplacian = np.einsum("eq,eqaj,eqbj->eab", w, dN, dN)
+    i, j = np.triu_indices(dofs.shape[1])
+    pattern = SymmetricPattern.of_elements(dofs, solid.bc.n_free // d)
+    return GlobalStep(pattern.assemble((masses + c * laplacian)[:, i, j]), d, at, stiffness)

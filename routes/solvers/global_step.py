@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.mechanics.global_step import GlobalStep
+from gradient_routes.problems.matrices.global_step import GlobalStep
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.solvers.solver import Factorization
 
