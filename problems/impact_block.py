@@ -23,10 +23,12 @@ from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions
 from gradient_routes.problems.fem.elements import SolidElement
 from gradient_routes.problems.fem.mesh import AXES
+from gradient_routes.problems.matrices.global_step import GlobalStep
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.sparse import SymmetricSparse
 from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.mechanics import solid_options as options
+from gradient_routes.problems.mechanics.global_step import global_step
 from gradient_routes.problems.mechanics.mass import Mass, element_masses
 from gradient_routes.problems.mechanics.rigid_plane import RigidPlane
 from gradient_routes.problems.problem import (
@@ -145,7 +147,9 @@ class ImpactBlock(Transient):
         self.v_0 = np.tile(v, self.n // 3)
         self.seed = seed
         i, j = np.triu_indices(3 * mesh.geometry.nodes.shape[1])
-        self.M: Any = self.solid.pattern.assemble(element_masses(mesh.geometry, density, mass)[:, i, j])
+        self.masses = element_masses(mesh.geometry, density, mass)
+        self.M: Any = self.solid.pattern.assemble(np.kron(self.masses, np.eye(3))[:, i, j])
+        self.projective, self.of_velocity = law == "arap", dt / 2.0
         self.row = density * float(mesh.geometry.metric[1].sum()) / (self.n // 3) / dt
         self.histories = EveryStep(self.name, steps, 2 * self.n, dt, self._dofs_of(sensors), self._name_of, noise)
         self._kept: tuple[Array, Array, Array] | None = None
@@ -161,6 +165,10 @@ class ImpactBlock(Transient):
         """Their derivative by u."""
         K: SymmetricSparse = self.solid.tangent(u, p)
         return K.plus_diagonal(self.plane.stiffness(u))
+
+    def global_step(self, p: Array) -> GlobalStep:
+        c, plane = self.h**2 / 4.0, self.plane
+        return global_step(self.solid, p, c, self.masses, plane.at, lambda u: c * plane.stiffness(u)[plane.at])
 
     def initial_state(self, p: Any, xp: Any = np) -> Any:
         return xp.concatenate([xp.zeros(self.n), xp.asarray(self.v_0)]).astype(p.dtype)

@@ -10,6 +10,7 @@ import numpy as np
 
 from gradient_routes.problems.errors import NotOffered
 from gradient_routes.problems.matrices.by_products import ByProducts
+from gradient_routes.problems.matrices.global_step import GlobalStep
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.problem import (
     Array,
@@ -35,9 +36,13 @@ class Transient(Problem):
 
     steps     T
     constant  R_t is affine in u_t and u_{t-1}, with the same R_u and R_v for all t
+    projective   it has a `global_step`, whose states are (u, v)
+    of_velocity  du/dv in a step of these, at rows of u that stay satisfied: h/2
     """
 
     constant: bool = False
+    projective: bool = False
+    of_velocity: float = 0.0
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -73,6 +78,10 @@ class Transient(Problem):
     def step_active_set(self, t: int, u: Array, p: Array) -> Hashable | None:
         """See `Problem.active_set`."""
         return None
+
+    def global_step(self, p: Array) -> GlobalStep:
+        """A constant matrix in place of D - b/a K of the step's R_u = [[a I, b I], [K, D]]."""
+        raise NotOffered(f"{self.name}: offers no constant matrix for its steps")
 
     def initial_state(self, p: Any, xp: Any = np) -> Any:
         """u_0 (n,), of p's dtype: rest."""

@@ -72,7 +72,7 @@ class Route:
               ends early where `affordable(options)` is false
     expect    (model, p, **options) -> options, the same by an inexpensive estimate
     tape      (problem, **options) -> bytes the AD tape is predicted to need for its iterations; None if unknown
-    sound     False for one that `all` does not include: wrong on purpose, or another code's
+    sound     False for one that `all` does not include: wrong on purpose, another code's, or of one problem alone
     accuracy  relative error its gradients have by nature on well-scaled problems; 0: that of the solver
     step      of differences of J, relative to max(|p_i|, scale_i): noise of J is divided by it; None: it takes none
     """

@@ -148,6 +148,7 @@ ORDER = (
     "adjoint",
     "unrolled-ad",
     "implicit-ad",
+    "projective",
     "faulty-adjoint",
     "adapter",
     "run",

@@ -26,7 +26,6 @@ def nodal_shares(element: Element, kind: Mass) -> Array:
 
 
 def element_masses(geometry: Geometry, density: float, kind: Mass) -> Array:
-    """(n_e, d n_a, d n_a) [kg], ordered node by node."""
+    """(n_e, n_a, n_a) [kg], the same for every component."""
     volumes = geometry.metric[1].sum(axis=1)
-    share = np.kron(nodal_shares(geometry.element, kind), np.eye(geometry.dim))
-    return np.asarray(density * volumes[:, None, None] * share)
+    return np.asarray(density * volumes[:, None, None] * nodal_shares(geometry.element, kind))
