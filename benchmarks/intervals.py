@@ -38,8 +38,10 @@ def covered(problem: str, seeds: int) -> Iterator[tuple[str, np.ndarray]]:
         made.measured = True  # as far as a fit can know
         ended = invert(spec, route, Engine("gauss-newton"), made=made)
         assert ended.fit is not None, ended.end
+        constants = ended.fit.constants
+        stating = () if constants is None else zip(constants.names, constants.value, constants.sd, strict=True)
         off = [abs(p - t) <= NORMAL * sd for p, t, sd in zip(ended.p, truth, ended.fit.sd, strict=True)]
-        off += [abs(value - stated[name]) <= NORMAL * sd for name, (value, sd) in ended.fit.stated.items()]
+        off += [abs(value - stated[name]) <= NORMAL * sd for name, value, sd in stating if name in stated]
         found.append(off)
     names = [*map(draws[0].parameters.label, range(len(truth))), *stated]
     yield from zip(names, np.transpose(found), strict=True)

@@ -66,8 +66,8 @@ class BoundaryValues:
         A = np.concatenate([np.ones((*near.shape, 1)), (x[near] - X[:, None]) / spacing[:, None, None]], axis=2)
         c = np.linalg.pinv(weight[..., None] * A, rcond=1e-4 * AT_POINT)[:, 0] * weight  # (n, k): value = c . d
         used = np.unique(near[np.abs(c) > NOTHING])
-        of_points = np.zeros((len(X), len(x)))
-        np.put_along_axis(of_points, near, c, axis=1)
-        noisy = (of_points[:, used] * s for s in np.broadcast_to(sigma, d.shape)[used].T)
+        of_points = np.zeros((len(X), len(about)))
+        np.put_along_axis(of_points, where.reshape(near.shape), c, axis=1)
+        noisy = (of_points * s for s in np.broadcast_to(sigma, d.shape)[about].T)
         root = np.stack([np.asarray(np.linalg.qr(by_point.T, mode="r")).T for by_point in noisy])
         return cls(np.einsum("nk,nkd->nd", c, d[near]), used, float(distance[:, 0].max()), root)

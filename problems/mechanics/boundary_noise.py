@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,11 +33,10 @@ class BoundaryNoise:
 
     def pulled(self, w: Array, lam: Array) -> Array:
         """Derivatives (k,) of w . y, w (m,), by independent unit normal variables; R_u^T lam = S_u^T w."""
-        known = self.data.solid.bc.known
-        found = []
+        bc, found = self.data.solid.bc, []
         for case, (G, of) in enumerate(zip(self._read(w), self.boundary, strict=True)):
-            G += self._held(w, lam, case)
-            found += [G[known, i] @ root for i, root in enumerate(of.root)]
+            g = np.where(bc.held, 0.0, G + self._held(w, lam, case))[bc.known]
+            found += [g[:, i] @ root for i, root in enumerate(of.root)]
         return np.concatenate(found)
 
     def _read(self, w: Array) -> list[Array]:
@@ -65,21 +65,28 @@ class BoundaryNoise:
         v = -solid.bc.variations(lam, case, every)
         if force is not None:
             v = v + w[len(w) - len(force.F) + case] * force.weight * force.reaction.e
-        G = np.zeros_like(v)
-        nodes = solid.mesh.geometry.nodes
-        np.add.at(
-            G,
-            nodes,
-            np.einsum("eij,ej->ei", self._matrices(case), v[nodes].reshape(len(nodes), -1)).reshape(*nodes.shape, -1),
-        )
+        G, nodes = np.zeros_like(v), self._cells
+        v_e = v[nodes].reshape(len(nodes), -1)
+        np.add.at(G, nodes, np.einsum("eij,ej->ei", self._matrices[case], v_e).reshape(*nodes.shape, -1))
         return G
 
-    def _matrices(self, case: int) -> Array:
-        """(n_e, d n_a, d n_a)."""
+    @property
+    def _cells(self) -> Array:
+        """Nodes (n_c, n_a) of the cells that have a node with a known displacement."""
+        return np.asarray(self.data.solid.mesh.geometry.nodes[self._beside])
+
+    @cached_property
+    def _beside(self) -> Array:
+        solid = self.data.solid
+        return np.flatnonzero(np.isin(solid.mesh.geometry.nodes, solid.bc.known).any(axis=1))
+
+    @cached_property
+    def _matrices(self) -> list[Array]:
+        """Those of these cells, (n_c, d n_a, d n_a), in every load case."""
         solid = self.data.solid
         s, nodes = solid.setup(self.p), solid.mesh.geometry.nodes
-        u_e = solid.displacements(self.u, s, case, nodes)
-        return solid.element_matrices(u_e, s)
+        each = (solid.displacements(self.u, s, case, nodes) for case in range(len(self.boundary)))
+        return [solid.element_matrices(u_e, s)[self._beside] for u_e in each]
 
 
 def boundary_noise(

@@ -159,7 +159,7 @@ def test_exact_routes_agree_with_complex_steps(options: dict[str, Any], tmp_path
 def test_noise_of_boundary_values_goes_into_readings_as_differences_say(motion: Any, tmp_path: Path) -> None:
     """Along one random change of all of them; readings are nearly linear in them."""
     data, noise = strip_data(tmp_path, (1000.0, FORCE)), 1e-7
-    plate = Plate(**GRIP, constants="E,nu", modulus=E, data=data, noise=noise, motion=motion)
+    plate = Plate(**GRIP, constants="E,nu", modulus=E, data=data, noise=noise, motion=motion, fixed="y@bottom")
     p, rng = plate.parameters.start, np.random.default_rng(0)
     by_p = Sensitivity(Model(plate, TIGHT), Model(plate, TIGHT).solve(p))
     u, w = by_p.R_u.state.u, rng.standard_normal(by_p.shape[0])

@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 import pytest
 
+from benchmarks.intervals import PROBLEMS, covered
 from gradient_routes.bench.cases.case import problems, routes
 from gradient_routes.bench.inversion.fit import fitted
 from gradient_routes.bench.inversion.invert import Engine, invert
@@ -207,3 +208,8 @@ def test_a_blind_direction_is_named_and_gets_no_bar(cli, tmp_path) -> None:
     ran = cli("invert", "--problem", f"{PATCH},constants=K,G]", "--no-store", "--no-plot")
     assert re.search(r"^blind direction: data do not see 0.99 log K -0.15 log G$", ran.out, re.M)
     assert "\nnu 0.3 without an error bar\n" in ran.out
+
+
+def test_the_study_of_intervals_counts_parameters_and_constants() -> None:
+    counted = {name: held.shape for name, held in covered(PROBLEMS[0], 2)}
+    assert counted == dict.fromkeys(["log mu", "log K", "mu [Pa]", "lam [Pa]", "E [Pa]", "nu"], (2,))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gradient_routes.bench.cases import case
-from gradient_routes.bench.inversion.frames import estimated
+from gradient_routes.bench.inversion.frames import estimated, read_frames
 from gradient_routes.bench.inversion.invert import Engine, Inversion, invert
 from gradient_routes.bench.inversion.linear_map import LinearMap, linear_map
 from gradient_routes.bench.inversion.linear_regime import LinearRegime
@@ -166,6 +166,17 @@ def test_frames_that_are_none_are_one_line(cli, frames, says: str) -> None:
     ran = cli("invert", "--linear", "--map", "map.npz", "--frames", name, "-o", "p.csv", "--no-store")
     assert (ran.code, says in ran.err, ran.err.count("\n")) == (2, True, 1), ran.err
     assert not Path("p.csv").exists()
+
+
+def test_columns_named_as_readings_that_share_a_name_are_taken_in_their_order_only(tmp_path: Path) -> None:
+    by = mapped(Bar())
+    by = replace(by, readings=np.array(["u", "u", *by.readings[2:]]))
+    frames_csv("u,u,u_3,u_4,u_5", np.arange(5.0)[None], str(tmp_path / "d.csv"))
+    frames, remark = read_frames(tmp_path / "d.csv", by)
+    assert (frames.tolist(), remark) == ([[0.0, 1.0, 2.0, 3.0, 4.0]], None)
+    frames_csv("u,u,u_4,u_3,u_5", np.arange(5.0)[None], str(tmp_path / "d.csv"))
+    with pytest.raises(InputError, match="several readings are u, and columns are not theirs in order"):
+        read_frames(tmp_path / "d.csv", by)
 
 
 @pytest.mark.parametrize(
