@@ -55,7 +55,7 @@ def in_time(n: int, h: float) -> str:
     for inner in ("cg", "plain"):
         found = projective.prepare(model, p, inner=inner)
         before = model.tally.work
-        assert norm(found(p).gradient - exact) < 1e-8 * norm(exact)  # of the little by which a short march depends on moduli
+        assert norm(found(p).gradient - exact) < 1e-8 * norm(exact)  # a short march depends little on moduli
         work = model.tally.work - before
         paid = ratio(lambda f=found: f(p), lambda: adjoint.prepare(model, p)(p))  # type: ignore[misc]
         gradients.append(f"{work.matvecs / steps:9.1f} {paid:8.2f}")

@@ -38,8 +38,7 @@ def differentiable_solve(
     The implicit function theorem is its pullback: u_bar -> R_p^T lam with R_u^T lam = -u_bar, one transposed
     solve with `factors` as LinearizedSolver takes them. `on_solved` is called with each state that a pullback holds.
     """
-    residual = model.traced.residual
-    R_p_transposed = jax.jit(lambda u, p, lam: jax.vjp(lambda p: residual(u, p), p)[1](lam)[0])
+    R_p_transposed = model.compiled.R_p_transposed
 
     @jax.custom_vjp
     def solve(p: Any) -> Any:

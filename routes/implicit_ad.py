@@ -47,7 +47,7 @@ def implicit_ad(model: Model, p: Array, *, factors: Factors = "refined", checkpo
 
     solved: list[Solved] = []
     solve = differentiable_solve(model, factors, solved.append)
-    objective = jax.jit(model.traced.objective)
+    objective = model.compiled.objective
 
     def gradient(p: Array) -> Result:
         J, pullback = jax.vjp(lambda p: objective(solve(p), p), p)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from gradient_routes.routes.solvers.factorization import Deferred, Factorizer
 from gradient_routes.routes.solvers.solver import Factorization
 from gradient_routes.routes.tally import Tally, Work
 
+if TYPE_CHECKING:
+    from gradient_routes.routes.compiled import Compiled
+
 
 class Model:
     """A problem that can be solved, with its work counted in `tally`, its own or the one given.
@@ -48,15 +51,20 @@ class Model:
         return self.problem.parameters
 
     @cached_property
-    def traced(self) -> Traced:
-        """R and J in jax.numpy: one object, so that JAX reuses what it has compiled."""
-        from gradient_routes.problems.jax64 import jax
+    def compiled(self) -> Compiled:
+        """R and J in jax.numpy."""
+        from gradient_routes.routes.compiled import compiled
 
-        traced, p = self.problem.traced(), self.parameters.start
-        u = self.initial(p)
-        for name, f in (("traced R", traced.residual), ("traced J", traced.objective)):
-            double(np.empty(0, jax.eval_shape(f, u, p).dtype), name, self._who)
-        return traced
+        p = self.parameters.start
+        found, dtypes = compiled(self.problem.traced(), self.initial(p), p)
+        for name, dtype in zip(("traced R", "traced J"), dtypes, strict=True):
+            double(np.empty(0, dtype), name, self._who)
+        return found
+
+    @property
+    def traced(self) -> Traced:
+        """R and J in jax.numpy."""
+        return self.compiled.traced
 
     def initial(self, p: Array) -> Array:
         return double(self.problem.initial(p), "u_0", self._who)

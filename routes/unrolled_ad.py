@@ -136,9 +136,7 @@ def resolve(
     if iterations is None and inner == "direct":
         iterations = steps
     elif iterations is None:
-        from gradient_routes.routes.solvers.traced_iterations import iteration
-
-        iterate = iteration(inner, model.traced)
+        iterate = model.compiled.iteration(inner)
         points = [model.initial(p)] + ([] if state is None else [near(problem, state.u)])
         at_most, iterations = 64, 0
         while True:
@@ -200,28 +198,17 @@ def unrolled_ad(
 
 
 def through_iterations(model: Model, p: Array, inner: str, k: int, newton: int, checkpoint: int | None) -> Gradient:
-    """Every linear iteration of every Newton step traced (jax.lax.scan) and compiled."""
-    from gradient_routes.problems.jax64 import jax
+    """Every linear iteration of every Newton step compiled."""
     from gradient_routes.routes.differentiable import held_bytes
-    from gradient_routes.routes.solvers.traced_iterations import count_products, iteration, solution
 
-    iterate, u_0 = iteration(inner, model.traced), model.initial(p)
+    u_0, made = model.initial(p), model.compiled.unrolled(inner, k, newton, checkpoint)
     what = f"{k} {inner} iterations" + (f" in each of {newton} Newton steps" if newton > 1 else "")
 
-    def objective(p: Any) -> tuple[Any, Any]:
-        u = solution(iterate, u_0, p, newton, k, checkpoint)
-        return model.traced.objective(u, p), u
-
-    forward = jax.jit(lambda p: jax.vjp(objective, p, has_aux=True)).trace(p)
-    backward = jax.jit(lambda pullback: pullback(1.0)[0]).trace(forward.out_info[1])
-    sweep, sweep_back = forward.lower().compile(), backward.lower().compile()
-    products = count_products(forward.jaxpr) + count_products(backward.jaxpr)
-
     def gradient(p: Array) -> Result:
-        J, pullback, u = sweep(p)
+        J, pullback, u = made.sweep(u_0, p)
         model.tally.count("forward_solves")
-        model.tally.count("matvecs", products)
-        dJ_dp, residual = sweep_back(pullback), model.relative_residual(np.asarray(u), p)
+        model.tally.count("matvecs", made.products)
+        dJ_dp, residual = made.sweep_back(pullback), model.relative_residual(np.asarray(u), p)
         return finished(u, J, dJ_dp, residual, held_bytes(pullback), what)
 
     return gradient
@@ -234,7 +221,7 @@ def through_newton(model: Model, k: int) -> Gradient:
     from gradient_routes.routes.unrolled_newton import UnrolledNewton
 
     u_k = UnrolledNewton(model)
-    objective = jax.jit(model.traced.objective)
+    objective = model.compiled.objective
 
     def gradient(p: Array) -> Result:
         steps, residual = model.newton_iterates(p, k)

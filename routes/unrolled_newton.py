@@ -36,14 +36,7 @@ class UnrolledNewton:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        R = model.traced.residual
-
-        def linearized(u: Any, p: Any, du: Any) -> Any:
-            """R(u, p) - R_u(u, p) du."""
-            value, along = jax.jvp(lambda u: R(u, p), (u,), (du,))
-            return value - along
-
-        self._pullback = jax.jit(lambda u, p, du, w: jax.vjp(lambda u, p: linearized(u, p, du), u, p)[1](w))
+        self._pullback = model.compiled.step_transposed
 
     def __call__(self, steps: Sequence[Step], p: Any) -> Any:
         u = jnp.asarray(steps[0].u)

@@ -24,6 +24,10 @@ os.environ.setdefault(
     "XLA_FLAGS", f"--xla_backend_optimization_level=0{KNOWN if version('jaxlib').startswith('0.10.') else ''}"
 )
 
+# one worker is one thread: more than processors wait for each other in loops, small matrices take five times as long
+for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(pool, "1")
+
 # where Python is to write no bytecode, hundreds of processes would compile the package anew
 if sys.dont_write_bytecode and "PYTEST_XDIST_WORKER" not in os.environ:
     for folder in ("gradient_routes", "bench", "routes", "problems"):

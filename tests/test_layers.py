@@ -16,7 +16,7 @@ HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "vl_convert"}
 FLOORS = ("problems", "routes", "bench")
 # what routes may know of floor 1: the contract, no single problem
 MATRICES = {f"matrices.{kind}" for kind in ("tridiagonal", "sparse", "recurrence", "step_matrix")}
-CONTRACT = {"problem", "transient", "rates", "errors", "text", "jax64"} | MATRICES
+CONTRACT = {"problem", "transient", "rates", "errors", "text", "jax64", "programs"} | MATRICES
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (
     *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "environments", "render"),
@@ -25,12 +25,15 @@ ORDER = (
 # the only modules that import JAX when they are imported; nothing imports those before it needs them
 TRACED = {
     "gradient_routes.problems.jax64",
+    "gradient_routes.problems.programs",
     "gradient_routes.problems.fem.assembly_jax",
+    "gradient_routes.problems.mechanics.by_ad",
     "gradient_routes.problems.mechanics.energies",
     "gradient_routes.problems.mechanics.isotropic_functions",
     "gradient_routes.problems.mechanics.plane_energies",
     "gradient_routes.problems.mechanics.polar",
     "gradient_routes.problems.mechanics.principal_stress",
+    "gradient_routes.routes.compiled",
     "gradient_routes.routes.differentiable",
     "gradient_routes.routes.solvers.traced_iterations",
     "gradient_routes.routes.traced_steps",

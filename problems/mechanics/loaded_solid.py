@@ -24,8 +24,9 @@ from gradient_routes.problems.mechanics.springs import Springs
 from gradient_routes.problems.problem import Array, Operator
 
 if TYPE_CHECKING:
-    from gradient_routes.problems.fem.assembly_jax import CompiledResidual, JaxAssembly
+    from gradient_routes.problems.fem.assembly_jax import JaxAssembly
     from gradient_routes.problems.fem.assembly_numpy import NumpyAssembly
+    from gradient_routes.problems.mechanics.by_ad import ByAd
     from gradient_routes.problems.mechanics.materials import MaterialLaw
 
 Load = Literal["traction", "displacement", "follower"]
@@ -157,12 +158,6 @@ class LoadedSolid:
 
         return assembly(self.law.W)
 
-    @cached_property
-    def _compiled(self) -> CompiledResidual:
-        from gradient_routes.problems.fem.assembly_jax import CompiledResidual
-
-        return CompiledResidual(self.potential, self.follower_residual if self.load == "follower" else None)
-
     # --- evaluated in NumPy
 
     def initial(self, p: Array) -> Array:
@@ -207,7 +202,7 @@ class LoadedSolid:
 
     def residual(self, u: Array, p: Array) -> Array:
         self.check(p)
-        return self.by_hand.residual(u, p) if self.use_numpy else self._compiled(u, p)
+        return self._derived.residual(u, p)
 
     def tangent(self, u: Array, p: Array) -> Any:
         s = self.setup(p)
@@ -268,16 +263,20 @@ class LoadedSolid:
         return jax.jit(columns, static_argnums=3)
 
     def tangent_operator(self, u: Array, p: Array) -> Operator:
-        return self.by_hand.R_u(u, p) if self.use_numpy else self._compiled.R_u(u, p)
+        return self._derived.R_u(u, p)
 
     def R_p(self, u: Array, p: Array) -> Operator:
         """R_p (n_u, n_p)."""
-        return self.by_hand.R_p(u, p) if self.use_numpy else self._compiled.R_p(u, p)
+        return self._derived.R_p(u, p)
 
     @property
     def traced_residual(self) -> Callable[[Any, Any], Any]:
         """R(u, p) in jax.numpy."""
-        return self._compiled.R
+        return self._by_ad.of_real.R
+
+    @property
+    def _derived(self) -> NumpyAssembly | ByAd:
+        return self.by_hand if self.use_numpy else self._by_ad
 
     @cached_property
     def by_hand(self) -> NumpyAssembly:
@@ -285,3 +284,9 @@ class LoadedSolid:
         from gradient_routes.problems.fem.assembly_numpy import NumpyAssembly
 
         return NumpyAssembly(self)
+
+    @cached_property
+    def _by_ad(self) -> ByAd:
+        from gradient_routes.problems.mechanics.by_ad import ByAd
+
+        return ByAd(self)

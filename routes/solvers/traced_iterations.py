@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from jax.extend.core import jaxprs_in_params
@@ -45,19 +46,22 @@ class Iteration:
 
     def iterations_to(self, at: Any, rtol: float, at_most: int) -> int:
         """The smallest k with |r_k|_inf <= rtol |f|_inf, or at_most."""
+        return int(self._count(at, rtol, at_most))
 
-        def unfinished(loop: Any) -> Any:
-            (_, r, *_), k, target = loop
-            return (jnp.abs(r).max() > target) & (k < at_most)
-
+    @cached_property
+    def _count(self) -> Callable[[Any, float, int], Any]:
         @jax.jit
-        def count(at: Any) -> Any:
+        def count(at: Any, rtol: Any, at_most: Any) -> Any:
             carry = self.start(at)
             target = rtol * jnp.abs(carry[1]).max()
-            loop = (carry, 0, target)
-            return jax.lax.while_loop(unfinished, lambda s: (self.step(at, s[0]), s[1] + 1, s[2]), loop)[1]
 
-        return int(count(at))
+            def unfinished(loop: Any) -> Any:
+                (_, r, *_), k = loop
+                return (jnp.abs(r).max() > target) & (k < at_most)
+
+            return jax.lax.while_loop(unfinished, lambda loop: (self.step(at, loop[0]), loop[1] + 1), (carry, 0))[1]
+
+        return count
 
 
 def solution(iteration: Iteration, u_0: Any, p: Any, newton: int, k: int, checkpoint: int | None = None) -> Any:

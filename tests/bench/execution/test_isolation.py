@@ -20,7 +20,7 @@ from gradient_routes.bench.cases.row import empty_row
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.isolation import process as watching
 from gradient_routes.bench.execution.isolation import worker_process as line
-from gradient_routes.bench.execution.isolation.limits import Limits
+from gradient_routes.bench.execution.isolation.limits import POOLS, Limits
 from gradient_routes.bench.execution.pruning import Pruning
 from gradient_routes.bench.execution.sweep import How, run
 from gradient_routes.bench.store.store import Store
@@ -205,8 +205,10 @@ def test_a_process_is_killed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     process.kill()
 
 
-def test_libraries_use_as_many_threads_as_they_may(started: Shell, cli) -> None:
+def test_libraries_use_as_many_threads_as_they_may(started: Shell, cli, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the processor time of each thread, which others on the machine do not change."""
+    for pool in POOLS:
+        monkeypatch.setenv(pool, "2")
     allowed = str(max(os.sched_getaffinity(0)))
     libraries = "by_blas|by_xla|by_pardiso"
     command = ("run", "--json", "--no-timing", "--route", "fd-central", "--problem")
