@@ -24,6 +24,7 @@ from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
 from gradient_routes.problems.data.units import standard_deviation
 from gradient_routes.problems.dynamics.bar_unknowns import UNIT_OF, BarUnknowns
+from gradient_routes.problems.dynamics.both_sides import BothSides
 from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
 from gradient_routes.problems.matrices.by_products import ByProducts
@@ -78,6 +79,7 @@ class VibratingBar(Transient):
         force: Annotated[float, "largest F at the end [N]"] = 1.0,
         pulse: Annotated[float, "duration of F, a sine squared [s]"] = 0.5,
         stop: Annotated[MovingStop, "beyond the tip, yielding by k_c"] = "none",
+        stops: Annotated[Literal["front", "both"], "both: a second one, as far behind the tip"] = "front",
         gap: Annotated[float, "that the tip may move before it meets the stop [m]"] = GAP,
         k_c: Annotated[float, "stiffness of the stop [N/m]"] = K_C,
         width: Annotated[float, "over which softplus and quadratic round the kink of the penalty [m]"] = STOP_WIDTH,
@@ -96,6 +98,7 @@ class VibratingBar(Transient):
             ("damping=skew", damping == "skew", True, {"c_g": c_g != 0.1}),
             ("data=FILE", data is not None, True, {"columns": columns, "units": units}),
             ("data=FILE", data is not None, False, {"sensors": sensors, "seed": seed}),
+            ("stop", stop != "none", True, {"stops": stops != "front"}),
             ("unknown=moduli", unknown == "moduli", True, {"alpha": alpha}),
         )
         if data is not None and modulus is None:
@@ -117,6 +120,10 @@ class VibratingBar(Transient):
             raise InputError(f"vibrating-bar: seed={seed} - choose seed >= 0")
         made = make_stop(stop, gap, k_c, width, self.name, GAP)
         assert not isinstance(made, RigidStop)
+        if made is not None and stops == "both":
+            if gap <= 0.0:
+                raise InputError(f"vibrating-bar: gap={gap:g} between two stops - choose gap > 0")
+            made = replace(made, law=BothSides(made.law, gap))
         if made is not None:
             self.stop, self.linear, self.constant = made, False, False
         self.n, self.steps, self.h, self.scheme = n, steps, dt, SCHEMES[scheme]

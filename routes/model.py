@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -189,15 +190,20 @@ class Model:
 
     def march_step(self, t: int, v: Array, p: Array, scale: float, polish: int = 0) -> tuple[Array, float]:
         """u_t from v = u_{t-1} by full Newton steps, and |R_t|_inf. Raises NotConverged that names the step."""
-        assert isinstance(self.problem, Transient)
-        step, q = Model(self.problem.at(t), replace(self.solver, newton="full"), self.tally), np.concatenate([v, p])
+        step, q = self._step(t), np.concatenate([v, p])
         u, history, _ = step._newton(step.initial(q), q, scale, step._direction(q), polish=polish)
         return u, history[-1]
 
+    def _step(self, t: int) -> Model:
+        """Step t in time, with this model's tally and its factorizer, which keeps analyses of patterns."""
+        assert isinstance(self.problem, Transient)
+        step = copy(self)
+        step.problem, step.solver = self.problem.at(t), replace(self.solver, newton="full")
+        return step
+
     def march_iterates(self, t: int, v: Array, p: Array, scale: float, k: int) -> tuple[list[Step], float]:
         """The first k full Newton steps to u_t from v = u_{t-1}, see `newton_iterates`, and |R_t|_inf after them."""
-        assert isinstance(self.problem, Transient)
-        step, q = Model(self.problem.at(t), replace(self.solver, newton="full"), self.tally), np.concatenate([v, p])
+        step, q = self._step(t), np.concatenate([v, p])
         steps, history = step._iterates(q, step.initial(q), scale, k)
         return steps, history[-1]
 

@@ -68,7 +68,19 @@ OPTIONS = {
     "fd-central": [{"step": None, "start": s} for s in ("cold", "warm", "chord")],
     "unrolled-ad": [unrolled_ad.defaults | {"inner": i} for i in ("cg", "richardson", "jacobi", "direct")],
 }
-ISOLATING = {"run", "scaling", "check", "vcurve", "kink", "tolerance", "unrolling", "invert", "consistency", "identify"}
+ISOLATING = {
+    "run",
+    "scaling",
+    "check",
+    "vcurve",
+    "kink",
+    "horizon",
+    "tolerance",
+    "unrolling",
+    "invert",
+    "consistency",
+    "identify",
+}
 BARS = {
     "bar[n=1]": {"n": 1},
     "bar[n=2]": {"n": 2},

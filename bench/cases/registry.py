@@ -157,6 +157,7 @@ ORDER = (
     "check",
     "tolerance",
     "unrolling",
+    "horizon",
     "kink",
     "invert",
     "consistency",

@@ -158,7 +158,7 @@ def test_histories_that_do_not_fit_the_march_are_refused(rows: str, says: str, t
         VibratingBar(n=4, steps=5, dt=0.1, data=str(tmp_path / "d.csv"), modulus=1.0)
 
 
-STOPPED = {
+STOPPED: dict[str, dict[str, Any]] = {
     "softplus": {"stop": "softplus", "width": 0.01},
     "quadratic": {"stop": "quadratic", "width": 0.05},
     "penalty": {"stop": "penalty"},
@@ -175,6 +175,20 @@ def test_gradients_hold_where_the_tip_meets_a_stop(scheme: str, stop: str) -> No
     assert np.diff(closed.astype(int)).min() < 0 < closed.sum()
     exact = complex_step.prepare(model, p)(p).gradient
     for route in (tangent, adjoint, implicit_ad, unrolled_ad):
+        assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
+
+
+def test_two_stops_hold_the_tip_between_them() -> None:
+    bar = made(steps=200, dt=0.05, gap=0.05, k_c=1e3, stop="quadratic", width=0.01, stops="both", n=2)
+    model, p = Model(bar, Solver(rtol=1e-14)), bar.parameters.start
+    tip = model.solve(p).u.reshape(200, 2, 2)[:, 0, -1]
+    assert tip.max() > 0.04
+    assert tip.min() < -0.04
+    assert np.abs(tip).max() < 0.1
+    short = made(steps=20, dt=0.05, gap=0.05, stop="softplus", stops="both", n=2)
+    model = Model(short, Solver(rtol=1e-14))
+    exact = complex_step.prepare(model, p)(p).gradient
+    for route in (adjoint, implicit_ad):
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
 
 
