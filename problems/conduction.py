@@ -191,20 +191,15 @@ class Heat(FirstOrder):
         return ByProducts(forward, reverse)
 
     def field_at_start(self, p: Any, xp: Any = np) -> Any:
+        """At every node the mean of the parts about it."""
         T_0 = self._values(p, xp)["initial"] - self.body.T_inf
-        start = self.solid.start if xp is np else xp.asarray(self.solid.start.toarray())
-        return (start @ T_0).astype(p.dtype)
+        return self.solid.cells.means(T_0[self.solid.cell_part], xp).astype(p.dtype)
 
     def initial_by(self, p: Array) -> Any:
-        from scipy.sparse import csr_array, hstack
-
-        if all(c.name != "initial" for c in self.unknowns.each):
+        at = next((c.at for c in self.unknowns.each if c.name == "initial"), None)
+        if at is None:
             return None
-        n = self.n_field
-        columns = [
-            self.solid.start if c.name == "initial" else csr_array((n, len(c.parts.x))) for c in self.unknowns.each
-        ]
-        return self.below(hstack(columns, format="csr"))
+        return self.below(self.solid.cells.means_by(at.start + self.solid.cell_part, len(p)))
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.unknowns.theta(p, xp)) if self.alpha else 0.0

@@ -33,7 +33,6 @@ class Conducting:
     parts             of coefficients of cells
     sides             parts of film coefficients
     volume (n,)       of each free node, lumped [m2]
-    start (n, parts)  temperatures of free nodes, means of those of the parts about them
     """
 
     mesh: Mesh
@@ -48,7 +47,6 @@ class Conducting:
     parts: Parts
     sides: Parts
     volume: Array
-    start: Any
     pattern: SymmetricPattern
 
     @classmethod
@@ -76,11 +74,9 @@ class Conducting:
         cells, edges, n = Numbering.of(nodes, free), Numbering.of(ends, free), int(free.sum())
         padded = (np.pad(dofs, ((0, 0), (0, 4 - k)), constant_values=-1)
                   for dofs, k in ((cells.dofs, 4), (edges.dofs, 2), (np.arange(n)[:, None], 1)))  # fmt: skip
-        share = cells.columns(np.ones(nodes.shape), cell_part, len(whole.x))
         return cls(
             mesh, free, D, m, cells, edges, np.linalg.norm(X[ends[:, 1]] - X[ends[:, 0]], axis=1),
             cell_part, edge_part, whole, sides, cells.scatter(np.broadcast_to(m, nodes.shape)),
-            share.multiply(1.0 / share.sum(axis=1)[:, None]).tocsr(),
             SymmetricPattern.of_elements(np.concatenate([*padded]), n),
         )  # fmt: skip
 
