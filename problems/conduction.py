@@ -25,7 +25,7 @@ from gradient_routes.problems.heat.conducting import Conducting
 from gradient_routes.problems.heat.unknowns import Unknowns
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import SymmetricSparse
-from gradient_routes.problems.problem import Array, ParameterView
+from gradient_routes.problems.problem import Array, Fields, ParameterView
 
 Unknown = Literal[
     "diffusivity", "film", "source", "initial", "diffusivity+film", "diffusivity+source", "diffusivity+initial",
@@ -234,6 +234,14 @@ class Heat(FirstOrder):
 
     def truth(self) -> Array | None:
         return None if self.measured else self.unknowns.truth
+
+    def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:
+        """T after the last step per node; a, f or T_0, and derivatives by a, log a, .., per cell."""
+        last, body = u.reshape(self.steps, -1)[-1, : self.n_field], self.body
+        of_cells = [c for c in self.unknowns.each if c.name != "film"]
+        values = {c.name: c.value(p) for c in of_cells}
+        values |= {f"dJ_d{'log_' * c.log}{c.of.symbol}": gradient[c.at] for c in of_cells}
+        return self.solid.fields(body.T_inf + last, body.T_inf + body.excess, values)
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         x = self.parameters.position

@@ -17,7 +17,7 @@ from gradient_routes.problems.fem.plane_meshes import rectangle_mesh
 from gradient_routes.problems.heat.unknowns import Parts
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
-from gradient_routes.problems.problem import Array
+from gradient_routes.problems.problem import Array, Fields
 
 AROUND = ("bottom", "right", "top", "left")
 EDGE = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0  # (v, u) on an edge of length 1
@@ -93,6 +93,14 @@ class Conducting:
         single = (i + j == 0).astype(float)
         weights = k[:, None] * self.D[i, j], (h * self.l)[:, None] * edge, (stored * self.volume)[:, None] * single
         return self.pattern.assemble(np.concatenate(weights))
+
+    def fields(self, T: Array, given: float, of_parts: dict[str, Array]) -> Fields:
+        """T (n,) [K] of free nodes and `given` at the others; values of parts, by name, per cell."""
+        X, (cell_type, cells) = self.mesh.geometry.X, self.mesh.geometry.for_meshio()
+        nodal = np.full(len(X), given)
+        nodal[self.free] = T
+        by_cell = {name: values[self.cell_part] for name, values in of_parts.items()}
+        return Fields(np.pad(X, ((0, 0), (0, 1))), cell_type, cells, {"T": nodal}, by_cell)
 
     def by(self, name: str, u: Array, given: float) -> ByProducts:
         """Derivatives of `balance` by k, f or h of the parts, (n, parts)."""

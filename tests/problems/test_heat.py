@@ -138,6 +138,18 @@ def test_matrices_are_those_that_scikit_fem_assembles() -> None:
     np.testing.assert_allclose(solid.volume, volume, rtol=1e-13)
 
 
+def test_fields_show_the_last_temperatures_and_what_parts_are_made_of() -> None:
+    heat = with_synthetic_data(Heat(n=2, steps=2, unknown="diffusivity+film", parts=2))
+    p = heat.parameters.start + 0.1 * np.arange(10)
+    found = adjoint.prepare(Model(heat), p)(p)
+    shown = heat.fields(p, found.u, found.lam, found.gradient)
+    assert shown.cell_data.keys() == {"diffusivity", "dJ_dlog_a"}
+    np.testing.assert_array_equal(shown.cell_data["diffusivity"], np.exp(p[:4])[heat.solid.cell_part])
+    T, x = shown.point_data["T"], shown.points[:, 0]
+    assert (T[x == 0.0] == 373.15).all()
+    np.testing.assert_allclose(T[x > 0.0], 293.15 + found.u.reshape(2, -1)[-1])
+
+
 # --- gradients
 
 
