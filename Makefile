@@ -31,8 +31,9 @@ STEEL = plate[body=hole,nx=16,ny=4,size=0.08,0.02,radius=0.004,element=quad8,law
 
 RUBBER = data=examples/measured/rubber.csv,noise=5kPa
 ROD = rod[data=examples/measured/cooled_rod.csv,length=400mm,diameter=12mm,conductivity=110,base=85degC,ambient=21.5degC,noise=0.1K
+WALL = heat[data=examples/measured/heated_wall.csv,noise=0.2K,size=100mm,n=10,ny=1,exposed=right,density=2300,heat_capacity=880,ambient=20degC,base=60degC,initial=20degC,unknown=diffusivity+film
 
-measured: $(READY) ## measurements to constants, wrong models flagged: a published steel plate, rubber curves to a block, a cooled rod
+measured: $(READY) ## measurements to constants, wrong models flagged: a published steel plate, rubber curves to a block, a cooled rod, a heated wall
 	-$(BIN)/routes invert --problem '$(STEEL)]' --optimizer gauss-newton --no-plot
 	$(BIN)/routes invert --problem '$(STEEL),motion=rigid]' --optimizer gauss-newton --no-plot
 	$(BIN)/routes identify --problem 'coupon[law=yeoh,$(RUBBER)]' --no-plot
@@ -42,6 +43,8 @@ measured: $(READY) ## measurements to constants, wrong models flagged: a publish
 	$(BIN)/routes identify --problem '$(ROD),parts=2]' --no-plot
 	-$(BIN)/routes invert --problem '$(ROD)]' --no-plot
 	$(BIN)/routes invert --problem '$(ROD),parts=2]' --no-plot
+	$(BIN)/routes invert --problem '$(WALL),steps=31,dt=10min]' --optimizer gauss-newton --no-plot
+	$(BIN)/routes invert --problem '$(WALL),steps=151,dt=2min,scheme=crank-nicolson]' --optimizer gauss-newton --no-plot
 	$(BIN)/routes report -o results/report.html
 
 test: $(READY) ## install into .venv, then the tests

@@ -65,8 +65,6 @@ class AdvectionInTime(FirstOrder):
         except InputError as error:
             raise InputError(str(error).replace("advection", self.name, 1)) from error
         self.supg, self.noise, self.seed = self.steady.supg, noise, seed
-        share = self.supg.cells.columns(np.ones(self.supg.cells.dofs.shape))
-        self.means = share.multiply(1.0 / share.sum(axis=1)[:, None]).tocsr()  # of the cells about free nodes (n, n_e)
         nodes = self.steady.sensor_nodes
         probe = Probe(nodes[:, None], np.ones((len(nodes), 1)), self.supg.x[nodes])
         self.set_march(len(self.supg.free), steps, h, scheme, probe, between=False)
@@ -113,10 +111,10 @@ class AdvectionInTime(FirstOrder):
     def field_at_start(self, p: Any, xp: Any = np) -> Any:
         if not self.initial_unknown:
             return super().field_at_start(p, xp)
-        return (self.means if xp is np else xp.asarray(self.means.toarray())) @ p
+        return self.supg.cells.means(p, xp)
 
     def initial_by(self, p: Array) -> Any:
-        return self.means if self.initial_unknown else None
+        return self.supg.cells.means_by(np.arange(len(p)), len(p)) if self.initial_unknown else None
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.steady.theta(p, xp)) if self.alpha else 0.0

@@ -25,7 +25,7 @@ from gradient_routes.problems.heat.conducting import Conducting
 from gradient_routes.problems.heat.unknowns import Unknowns
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import SymmetricSparse
-from gradient_routes.problems.problem import Array, ParameterView
+from gradient_routes.problems.problem import Array, Fields, ParameterView
 
 Unknown = Literal[
     "diffusivity", "film", "source", "initial", "diffusivity+film", "diffusivity+source", "diffusivity+initial",
@@ -191,20 +191,15 @@ class Heat(FirstOrder):
         return ByProducts(forward, reverse)
 
     def field_at_start(self, p: Any, xp: Any = np) -> Any:
+        """At every node the mean of the parts about it."""
         T_0 = self._values(p, xp)["initial"] - self.body.T_inf
-        start = self.solid.start if xp is np else xp.asarray(self.solid.start.toarray())
-        return (start @ T_0).astype(p.dtype)
+        return self.solid.cells.means(T_0[self.solid.cell_part], xp).astype(p.dtype)
 
     def initial_by(self, p: Array) -> Any:
-        from scipy.sparse import csr_array, hstack
-
-        if all(c.name != "initial" for c in self.unknowns.each):
+        at = next((c.at for c in self.unknowns.each if c.name == "initial"), None)
+        if at is None:
             return None
-        n = self.n_field
-        columns = [
-            self.solid.start if c.name == "initial" else csr_array((n, len(c.parts.x))) for c in self.unknowns.each
-        ]
-        return self.below(hstack(columns, format="csr"))
+        return self.below(self.solid.cells.means_by(at.start + self.solid.cell_part, len(p)))
 
     def phi(self, p: Any, xp: Any = np) -> Any:
         return self.regularization.value(xp, self.unknowns.theta(p, xp)) if self.alpha else 0.0
@@ -239,6 +234,14 @@ class Heat(FirstOrder):
 
     def truth(self) -> Array | None:
         return None if self.measured else self.unknowns.truth
+
+    def fields(self, p: Array, u: Array, lam: Array | None, gradient: Array) -> Fields:
+        """T after the last step per node; a, f or T_0, and derivatives by a, log a, .., per cell."""
+        last, body = u.reshape(self.steps, -1)[-1, : self.n_field], self.body
+        of_cells = [c for c in self.unknowns.each if c.name != "film"]
+        values = {c.name: c.value(p) for c in of_cells}
+        values |= {f"dJ_d{'log_' * c.log}{c.of.symbol}": gradient[c.at] for c in of_cells}
+        return self.solid.fields(body.T_inf + last, body.T_inf + body.excess, values)
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         x = self.parameters.position

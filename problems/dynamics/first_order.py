@@ -66,7 +66,7 @@ class FirstOrder(Transient):
 
     a = 1: backward Euler, of order 1; a = 1/2: Crank & Nicolson 1947, of order 2. Data between two steps are compared
     with both: the state is then (u_t, y_{t-1}), with what the sensors read before the step as unknowns of their own.
-    The methods from `rates` to `by_p` are a problem's own.
+    The methods from `stored` to `field_at_start` are a problem's own.
     """
 
     offers = Offers.LINEARIZE | Offers.TRACE | Offers.COMPLEX
@@ -134,15 +134,10 @@ class FirstOrder(Transient):
             if self.held:
                 from scipy.sparse import block_array, csr_array
 
-                m = self.held
-                S, none = self._S, csr_array((m, m))
-                rows = SymmetricPattern.of_elements(np.arange(m)[:, None], m).assemble(
-                    np.full((m, 1), self.row, p.dtype)
-                )
-                new, old = (
-                    BlockDiagonal((new, rows)),
-                    block_array([[old.full(), None], [-self.row * S, none]], format="csr"),
-                )
+                m, dofs = self.held, np.arange(self.held)[:, None]
+                one = SymmetricPattern.of_elements(dofs, m).assemble(np.full((m, 1), self.row, p.dtype))
+                new = BlockDiagonal((new, one))
+                old = block_array([[old.full(), None], [-self.row * self._S, csr_array((m, m))]], format="csr")
             self._kept = p.copy(), (new, old)
         return self._kept[1]
 
@@ -210,7 +205,7 @@ class FirstOrder(Transient):
     def observation(self, u: Array, p: Array) -> Observation:
         from scipy.sparse import csr_array
 
-        data, root, n, m = self.data, self.c**0.5, self.n_field, len(self.probe.N)
+        data, root, n = self.data, self.c**0.5, self.n_field
         k = np.arange(len(data.d))
         S = self._S[data.sensor].tocoo()
         rows, columns, values = [S.row], [S.col], [data.w[S.row] * S.data]
@@ -225,7 +220,7 @@ class FirstOrder(Transient):
         which = data.step - 1, data.sensor
         predicted = (1.0 - data.w) * before[which] + data.w * now[which]
         x, t = self.probe.x, (data.step - 1 + data.w) * self.h
-        many = np.ptp(x, axis=0).max() or 1.0
+        extent = np.ptp(x, axis=0).max() or 1.0  # the march is as long as the sensors are apart
         return Observation(
             root * predicted,
             root * data.d,
@@ -233,7 +228,7 @@ class FirstOrder(Transient):
             sigma=root * self.noise,
             weight=root,
             label=lambda k: f"{self._place(x[data.sensor[k]])} at {t[k]:.6g} s",
-            position=np.column_stack([x[data.sensor], t / (self.steps * self.h) * many]) if m else None,
+            position=np.column_stack([x[data.sensor], t / (self.steps * self.h) * extent]),
         )
 
     @staticmethod

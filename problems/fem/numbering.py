@@ -35,6 +35,16 @@ class Numbering:
         """The sums (n,) of what elements give to their nodes, (n_e, k)."""
         return xp.append(R_e, 0.0)[self.entries].sum(axis=1)
 
+    def means(self, values: Any, xp: Any = np) -> Any:
+        """At each degree of freedom (n,), the mean of the values (n_e,) of the elements that meet there."""
+        ones = np.ones(self.dofs.shape)
+        return self.scatter(values[:, None] * ones, xp) / self.scatter(ones)
+
+    def means_by(self, column: Array, count: int) -> Any:
+        """Their derivative by values (count,) that elements share, sparse (n, count)."""
+        ones = np.ones(self.dofs.shape)
+        return self.columns(ones / self.gather(self.scatter(ones), given=1.0), column, count)
+
     def columns(self, by_e: Array, column: Array | None = None, count: int | None = None) -> Any:
         """The sparse (n, count) matrix with by_e[e] (k,) in the rows dofs[e] of the column of e, by default e."""
         from scipy.sparse import csr_array

@@ -17,7 +17,7 @@ from gradient_routes.problems.fem.plane_meshes import rectangle_mesh
 from gradient_routes.problems.heat.unknowns import Parts
 from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.sparse import SymmetricPattern, SymmetricSparse
-from gradient_routes.problems.problem import Array
+from gradient_routes.problems.problem import Array, Fields
 
 AROUND = ("bottom", "right", "top", "left")
 EDGE = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0  # (v, u) on an edge of length 1
@@ -33,7 +33,6 @@ class Conducting:
     parts             of coefficients of cells
     sides             parts of film coefficients
     volume (n,)       of each free node, lumped [m2]
-    start (n, parts)  temperatures of free nodes, means of those of the parts about them
     """
 
     mesh: Mesh
@@ -48,7 +47,6 @@ class Conducting:
     parts: Parts
     sides: Parts
     volume: Array
-    start: Any
     pattern: SymmetricPattern
 
     @classmethod
@@ -76,11 +74,9 @@ class Conducting:
         cells, edges, n = Numbering.of(nodes, free), Numbering.of(ends, free), int(free.sum())
         padded = (np.pad(dofs, ((0, 0), (0, 4 - k)), constant_values=-1)
                   for dofs, k in ((cells.dofs, 4), (edges.dofs, 2), (np.arange(n)[:, None], 1)))  # fmt: skip
-        share = cells.columns(np.ones(nodes.shape), cell_part, len(whole.x))
         return cls(
             mesh, free, D, m, cells, edges, np.linalg.norm(X[ends[:, 1]] - X[ends[:, 0]], axis=1),
             cell_part, edge_part, whole, sides, cells.scatter(np.broadcast_to(m, nodes.shape)),
-            share.multiply(1.0 / share.sum(axis=1)[:, None]).tocsr(),
             SymmetricPattern.of_elements(np.concatenate([*padded]), n),
         )  # fmt: skip
 
@@ -97,6 +93,14 @@ class Conducting:
         single = (i + j == 0).astype(float)
         weights = k[:, None] * self.D[i, j], (h * self.l)[:, None] * edge, (stored * self.volume)[:, None] * single
         return self.pattern.assemble(np.concatenate(weights))
+
+    def fields(self, T: Array, given: float, of_parts: dict[str, Array]) -> Fields:
+        """T (n,) [K] of free nodes and `given` at the others; values of parts, by name, per cell."""
+        X, (cell_type, cells) = self.mesh.geometry.X, self.mesh.geometry.for_meshio()
+        nodal = np.full(len(X), given)
+        nodal[self.free] = T
+        by_cell = {name: values[self.cell_part] for name, values in of_parts.items()}
+        return Fields(np.pad(X, ((0, 0), (0, 1))), cell_type, cells, {"T": nodal}, by_cell)
 
     def by(self, name: str, u: Array, given: float) -> ByProducts:
         """Derivatives of `balance` by k, f or h of the parts, (n, parts)."""

@@ -72,6 +72,8 @@ class PardisoFactorization(Factorization):
 
     def _substitute(self, solver: Any, b: Array) -> Array:
         dtype = np.complex128 if self._mtype in (COMPLEX_SYMMETRIC, COMPLEX_GENERAL) else np.float64
+        if np.iscomplexobj(b) and dtype is np.float64:  # R_u need not depend on p
+            return self._substitute(solver, b.real) + 1j * self._substitute(solver, b.imag)
         return np.asarray(solver.solve(np.ascontiguousarray(b, dtype=dtype)))
 
     def _factorized(self, A: Any, transposed: bool) -> Any:

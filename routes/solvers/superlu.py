@@ -46,6 +46,8 @@ class SparseFactorization(Factorization):
         return int(self.lu.nnz * (self._A.dtype.itemsize + 4))  # entries and their row numbers
 
     def substitute(self, b: Array, transposed: bool) -> Array:
+        if np.iscomplexobj(b) and not np.iscomplexobj(self._A.data):  # R_u need not depend on p
+            return self.substitute(b.real, transposed) + 1j * self.substitute(b.imag, transposed)
         return np.asarray(self.lu.solve(b, "T" if transposed else "N"))
 
     @property

@@ -122,6 +122,34 @@ def test_the_gradient_of_parts_adds_up_to_that_of_the_whole(name: Any) -> None:
     assert len(pairs) == len(many.gradient)  # both a square of parts and the way round it are closed
 
 
+def test_matrices_are_those_that_scikit_fem_assembles() -> None:
+    from skfem import Basis, BilinearForm, ElementQuad1, FacetBasis, LinearForm
+    from skfem.helpers import dot, grad
+
+    solid = Heat(n=3, ny=2, size="0.3,0.1", exposed="right,top").solid
+    mesh, k, h = solid.mesh.skfem_mesh, 50.0, 20.0
+    cells = Basis(mesh, ElementQuad1())
+    sides = FacetBasis(mesh, ElementQuad1(), facets=mesh.facets_satisfying(lambda x: (x[0] == 0.3) | (x[1] == 0.1)))
+    K = BilinearForm(lambda u, v, _: k * dot(grad(u), grad(v))).assemble(cells)
+    K = (K + BilinearForm(lambda u, v, _: h * u * v).assemble(sides)).toarray()[np.ix_(solid.free, solid.free)]
+    found = solid.matrix(np.full(6, k), np.full(5, h), 0.0).full().toarray()
+    np.testing.assert_allclose(found, K, atol=1e-13 * k)
+    volume = LinearForm(lambda v, _: 1.0 * v).assemble(cells)[solid.free]
+    np.testing.assert_allclose(solid.volume, volume, rtol=1e-13)
+
+
+def test_fields_show_the_last_temperatures_and_what_parts_are_made_of() -> None:
+    heat = with_synthetic_data(Heat(n=2, steps=2, unknown="diffusivity+film", parts=2))
+    p = heat.parameters.start + 0.1 * np.arange(10)
+    found = adjoint.prepare(Model(heat), p)(p)
+    shown = heat.fields(p, found.u, found.lam, found.gradient)
+    assert shown.cell_data.keys() == {"diffusivity", "dJ_dlog_a"}
+    np.testing.assert_array_equal(shown.cell_data["diffusivity"], np.exp(p[:4])[heat.solid.cell_part])
+    T, x = shown.point_data["T"], shown.points[:, 0]
+    assert (T[x == 0.0] == 373.15).all()
+    np.testing.assert_allclose(T[x > 0.0], 293.15 + found.u.reshape(2, -1)[-1])
+
+
 # --- gradients
 
 

@@ -98,6 +98,15 @@ def test_factorizations_invert_general_matrices_and_their_transposes(linear_solv
         held = [] if held else [factors]
 
 
+@pytest.mark.parametrize("linear_solver", ["superlu", "pardiso"])
+def test_a_real_matrix_takes_complex_loads(linear_solver: str) -> None:
+    """R_u of a problem whose p is in its load alone, at a complex p."""
+    A, b = PATTERN.assemble(entries(float)), RNG.standard_normal(N) + 1j * RNG.standard_normal(N)
+    factors = Factorizer(linear_solver)(A, "test")
+    np.testing.assert_allclose(A @ factors.solve(b), b, rtol=1e-9)
+    np.testing.assert_allclose(A.T @ factors.solve_transposed(b), b, rtol=1e-9)
+
+
 def test_a_zero_diagonal_is_no_obstacle() -> None:
     pattern = GeneralPattern.of_elements(np.array([[0, 1], [2, 3]]), 4)
     A = pattern.assemble(np.tile([[0.0, 2.0], [-3.0, 0.0]], (2, 1, 1)))
