@@ -19,8 +19,9 @@ from gradient_routes.problems.matrices.step_matrix import StepMatrix
 from gradient_routes.problems.problem import Array, Problem
 from gradient_routes.problems.transient import Transient
 from gradient_routes.routes.anderson import Anderson
+from gradient_routes.routes.linearized_solve import SAFETY
 from gradient_routes.routes.model import Model
-from gradient_routes.routes.newton import norm
+from gradient_routes.routes.newton import ROUNDING, norm
 from gradient_routes.routes.route import ForwardWork, Offers, Result, Work, route
 from gradient_routes.routes.solvers.global_step import GlobalFactors
 from gradient_routes.routes.solvers.krylov import conjugate_gradients
@@ -109,15 +110,15 @@ class Projective:
             tuple(history),
         )
 
-    def adjoint(self, A: StepMatrix, z: Array, b: Array) -> Array:
-        """lam (2 n,) of A^T lam = b, v eliminated as in A."""
+    def adjoint(self, A: StepMatrix, z: Array, b: Array, wanted: float) -> Array:
+        """lam (2 n,) of A^T lam = b, u eliminated as in A, to |b - A^T lam|_inf <= wanted."""
         r, s = np.split(b, 2)
-        y = self.eliminated(A.schur, z, s - (A.b / A.a) * r)
+        y = self.eliminated(A.schur, z, s - (A.b / A.a) * r, wanted)
         return np.concatenate([(r - A.K.T @ y) / A.a, y])
 
-    def eliminated(self, S: object, z: Array, b: Array) -> Array:
+    def eliminated(self, S: object, z: Array, b: Array, wanted: float) -> Array:
         """y (n,) of (M + h^2/4 K) y = b. Raises NotConverged."""
-        wanted = self.adjoint_rtol * norm(b)
+        wanted = max(wanted / SAFETY, ROUNDING * norm(b))
 
         def product(y: Array) -> Array:
             return self.model.matvec(S, y)
@@ -149,7 +150,7 @@ class Projective:
         lin, R_u = problem.linearize(states.ravel(), p), self.model.tangent(states.ravel(), p)
         lam, mu, J_u = np.empty_like(states), np.zeros_like(states[0]), lin.J_u.reshape(states.shape)
         for t in range(problem.steps)[::-1]:
-            lam[t] = self.adjoint(R_u.diagonal(t), states[t], -J_u[t] - mu)
+            lam[t] = self.adjoint(R_u.diagonal(t), states[t], -J_u[t] - mu, self.adjoint_rtol * norm(lin.J_u))
             mu = R_u.below(t).T @ lam[t]
         J = float(self.model.objective(states.ravel(), p))
         gradient = lin.J_p + lin.R_p.T @ lam.ravel()

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "gradient_routes"
 HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "vl_convert"}
 FLOORS = ("problems", "routes", "bench")
 # what routes may know of floor 1: the contract, no single problem
-MATRICES = {f"matrices.{kind}" for kind in ("tridiagonal", "sparse", "recurrence", "step_matrix")}
+MATRICES = {f"matrices.{kind}" for kind in ("tridiagonal", "sparse", "recurrence", "step_matrix", "global_step")}
 CONTRACT = {"problem", "transient", "rates", "errors", "text", "jax64", "programs"} | MATRICES
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (

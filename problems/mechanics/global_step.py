@@ -1,10 +1,10 @@
 """The global step of projective methods: one constant matrix in place of M + c K(u), a scalar for every node.
 
-    S = A x I_d + E diag(k(u)) E^T,    A = M + c sum over points of (2 mu + lam/2) grad N . grad N dx
+    S = A x I_d + E diag(k(u)) E^T,    A = M + c sum over points of (2 mu + 3/2 lam) grad N . grad N dx
 
-mu |F - R|^2 has at most the curvature of mu |F|^2, and lam/2 (J - 1)^2 is met halfway, so that what S differs by from
-M + c K is contracted (Bouaziz et al. 2014; Du et al. 2021, DiffPD). The stiffness k of what a body touches is exact: E
-picks the displacements `at`.
+K of mu |F - R|^2 is at most 2 mu times the Laplacian, that of lam/2 (J - 1)^2 at small strain 3 lam times, which a
+dilation reaches: 2 S exceeds M + c K, so that plain sweeps converge there. The stiffness k of what a body touches is
+exact: E picks the unknowns `at`. Bouaziz et al. 2014; Du et al. 2021, DiffPD.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def global_step(
     geometry, d = solid.mesh.geometry, solid.mesh.geometry.dim
     first, (mu, lam), (dN, dx) = solid.bc.index[0, :, 0], solid.setup(p).q, geometry.metric
     dofs = np.where(first < solid.bc.n_free, first // d, -1)[geometry.nodes]
-    w = (2.0 * mu + 0.5 * lam)[..., None] * dx if np.ndim(mu) else (2.0 * mu + 0.5 * lam) * dx
+    w = (2.0 * mu + 1.5 * lam)[..., None] * dx if np.ndim(mu) else (2.0 * mu + 1.5 * lam) * dx
     if len(dN) == 1:
         laplacian = np.einsum("eq,qab->eab", w, np.einsum("qaj,qbj->qab", dN[0], dN[0]))
     else:
