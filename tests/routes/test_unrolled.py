@@ -117,13 +117,12 @@ def test_checkpoints_change_the_bill_and_not_the_gradient(inner: str, checkpoint
     assert products == 60 + 30 - 30 % checkpoint
 
 
-@pytest.mark.parametrize(("newton", "k"), [(1, 4), (2, 3)])
-def test_conjugate_gradients_inside_newton_give_the_gradient_of_their_iterate(newton: int, k: int) -> None:
+@pytest.mark.parametrize(("problem", "newton", "k"), [(Bar(stop="softplus"), 1, 4), (Block(n=2), 2, 3)])
+def test_conjugate_gradients_inside_newton_give_the_gradient_of_their_iterate(problem, newton: int, k: int) -> None:
     """Equal to central differences of the same few iterations, far from the solution."""
-    block = Block(n=2)
-    p, traced = block.parameters.start, block.traced()
-    iterate, u_0 = iteration("cg", traced), np.zeros(block.n_state)
-    result = unrolled_ad.prepare(Model(block), p, inner="cg", iterations=k, newton=newton)(p)
+    p, traced = problem.parameters.start, problem.traced()
+    iterate, u_0 = iteration("cg", traced), np.zeros(problem.n_state)
+    result = unrolled_ad.prepare(Model(problem), p, inner="cg", iterations=k, newton=newton)(p)
 
     @jax.jit
     def J_k(p: np.ndarray) -> jax.Array:
@@ -132,18 +131,18 @@ def test_conjugate_gradients_inside_newton_give_the_gradient_of_their_iterate(ne
     h = 1e-5
     fd = np.array([float(J_k(p + h * e) - J_k(p - h * e)) / (2 * h) for e in np.eye(len(p))])
     assert relative_error(result.gradient, fd) < 1e-7  # h^2, and eps J / h
-    assert relative_error(result.gradient, implicit_ad.prepare(Model(block), p)(p).gradient) > 1e-3
+    assert relative_error(result.gradient, implicit_ad.prepare(Model(problem), p)(p).gradient) > 1e-3
 
 
 def test_converged_conjugate_gradients_inside_newton_give_the_gradient_of_the_solution() -> None:
-    block = Block(n=2)
-    p, model = block.parameters.start, Model(block)
+    bar = Bar(n=4, stop="softplus")
+    p, model = bar.parameters.start, Model(bar)
     options = unrolled_ad.resolve(model, p, **OPEN | {"inner": "cg"})
     assert options["newton"] == model.solve(p).work.newton_iterations
     result = unrolled_ad.prepare(model, p, **options)(p)
-    assert relative_error(result.gradient, implicit_ad.prepare(Model(block), p)(p).gradient) < 1e-9
+    assert relative_error(result.gradient, implicit_ad.prepare(Model(bar), p)(p).gradient) < 1e-9
     each = (result.tape - unrolled_ad.prepare(model, p, **options | {"iterations": 10})(p).tape) / (
-        unrolled_ad.tape(block, **options) - unrolled_ad.tape(block, **options | {"iterations": 10})
+        unrolled_ad.tape(bar, **options) - unrolled_ad.tape(bar, **options | {"iterations": 10})
     )
     assert each == 1.0
 

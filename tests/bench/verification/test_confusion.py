@@ -10,7 +10,7 @@ from commands import ROOT
 
 from benchmarks.boxes import judging
 from benchmarks.boxes.families import FAMILIES
-from benchmarks.confusion import PROBLEMS, Cell, Judged, built, cells, judge, point
+from benchmarks.confusion import Cell, Judged, built, cells, judge, point
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.verification.check import check
 from gradient_routes.bench.verification.plan import Plan
@@ -35,11 +35,13 @@ CULPRITS = {
 
 
 def affordable() -> list[Cell]:
-    """All cells, but of the blocks, where a check takes seconds: those expected alike on both, on each in turn."""
-    blocks, dear, light = [p for p in PROBLEMS if p.startswith("block")], {}, []
+    """All cells, but of those where a check takes seconds, on blocks and through iterations: of those expected alike on
+    problems of a kind, one."""
+    dear, light = {}, []
     for cell in CELLS:
-        if cell.problem in blocks:
-            dear.setdefault((cell.route, cell.expected), []).append(cell)
+        kind = cell.problem.partition("[")[0]
+        if kind == "block" or cell.route == "unrolled-ad":
+            dear.setdefault((kind, cell.route, cell.expected), []).append(cell)
         else:
             light.append(cell)
     return light + [alike[k % len(alike)] for k, alike in enumerate(dear.values())]
