@@ -32,7 +32,6 @@ Unknown = Literal[
     "film+source", "film+initial", "source+initial",
 ]  # fmt: skip
 DT = 30.0  # [s]
-KEPT = 0.6  # of an oscillation in a step, from which on a note tells it
 
 
 class Heat(FirstOrder):
@@ -135,20 +134,8 @@ class Heat(FirstOrder):
         self.parameters = self.unknowns.parameters(np.array(body.size))
         self.regularization = Prior(alpha, phi, phi_width, self.unknowns.neighbours)
         self.regularization.check(self.name)
-        self.notes = (*self._doubts(), *self.read_as)
-
-    def _doubts(self) -> list[str]:
-        """That the trapezoidal rule keeps the shortest waves of a sudden start, with alternating sign."""
-        dx = np.array(self.body.size) / self.body.cells
-        z = 2.0 * self.sizes["diffusivity"] * self.h * (dx[: 1 + (self.body.cells[1] > 1)] ** -2.0).sum()
-        kept = abs((1.0 - z) / (1.0 + z))
-        sudden = self.body.base not in (None, self.body.T_0)
-        if self.a == 1.0 or not sudden or z < 1.0 or kept < KEPT:
-            return []
-        return [
-            f"crank-nicolson: the shortest waves of the sudden start alternate and keep {kept:.0%} in a step -"
-            f" dt={self.h / z:.2g} damps them at once, as backward-euler does"
-        ]
+        known = self._recorded[1] if self._recorded is not None and not {"source", "initial"} & {*names} else None
+        self.notes = (*body.doubts(sizes, self.h, self.a < 1.0, known), *self.read_as)
 
     # --- the equations
 

@@ -25,6 +25,8 @@ DEFAULTS: Mapping[str, Any] = {
 }
 START = {"source": 1e5}  # where it is unknown
 CELLS_MAX = 10**6
+BEYOND = 0.05  # of the range of temperatures, that noise may add to it
+KEPT = 0.6  # of an oscillation in a step, from which on a note tells it
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,28 @@ class Body:
         if "initial" in started:
             found["initial"] = float(T[t.argmin()])
         return found
+
+    def doubts(self, sizes: Mapping[str, float], h: float, trapezoidal: bool, T: Array | None) -> list[str]:
+        """That the trapezoidal rule keeps the shortest waves of a sudden start, with alternating sign; and data T that
+        are warmer or colder than all that heats the body, where that is known.
+        """
+        said = []
+        dx = np.array(self.size) / self.cells
+        z = 2.0 * sizes["diffusivity"] * h * float((dx[: 1 + (self.cells[1] > 1)] ** -2.0).sum())
+        kept, sudden = (z - 1.0) / (1.0 + z), self.base not in (None, self.T_0)
+        if trapezoidal and sudden and kept > KEPT:
+            said.append(
+                f"crank-nicolson: the shortest waves of the sudden start alternate and keep {kept:.0%} in a step -"
+                f" dt={h / z:.2g} damps them at once, as backward-euler does"
+            )
+        if T is not None and self.f == 0.0:
+            ends = [self.T_inf, self.T_0, *([] if self.base is None else [self.base])]
+            low, high, margin = min(ends), max(ends), BEYOND * (max(ends) - min(ends))
+            beyond = (T < low - margin) | (T > high + margin)
+            if beyond.any():
+                where = f"{low:g} to {high:g} K"
+                said.append(f"{beyond.sum()} of {len(T)} data lie beyond {where}, which no body does - check units")
+        return said
 
     @classmethod
     def of(cls, given: Mapping[str, Any], names: list[str]) -> Body:
