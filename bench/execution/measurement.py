@@ -113,7 +113,7 @@ def measure(
 ) -> Measurement | Outcome:
     """A case up to its timing, which comes in turns; an Outcome where there is nothing to time.
 
-    `begin` is told of every phase that begins.
+    `begin` is told of every phase that begins. Raises InputError for options that the route has, not on this problem.
     """
     record.add({"n_param": context.n_p, "partial": context.partial})
     try:
@@ -123,7 +123,18 @@ def measure(
     except Unsupported as unknown:
         return record.ended(Status.SKIPPED, str(unknown), environment=environment())
     except FOREIGN as failure:
+        if isinstance(failure, InputError) and "n_state" in record.known and not _takes(context, case):
+            raise
         return record.failed(failure, case.route.name, environment=environment())
+
+
+def _takes(context: CaseContext, case: Case) -> bool:
+    """Whether the route's options are right for the problem."""
+    try:
+        case.route.route.objection(context.problem, **case.route.options)
+    except InputError:
+        return False
+    return True
 
 
 def _measured(context: CaseContext, case: Case, record: Record, begin: Callable[[str], None]) -> Measurement | Outcome:

@@ -29,7 +29,7 @@ class RecurrenceFactorization(Factorization):
         first = self._blocks[0]
         schur = first.schur if isinstance(first, StepFactorization) else None
         if len(A.A) < A.steps and isinstance(schur, BandedFactorization):
-            self._steps = StepMarch(A.A[0], A.B[0], schur.lu)
+            self._steps = StepMarch(A.A[0], A.B[0], schur.lu, A.steps)
 
     @property
     def nbytes(self) -> int:

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from functools import cache
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.problem import Array
+
+WORTH = 1e6  # nodes times steps from which a march is worth the seconds of the first compilation
+
+
+@cache
+def compiled() -> Any:
+    """The module of loops that Numba compiles, or None where it is not installed."""
+    if find_spec("numba") is None:
+        return None
+    from gradient_routes.routes.solvers import compiled_march
+
+    return compiled_march
 
 
 class StepMarch:
@@ -22,7 +36,7 @@ class StepMarch:
         S^T s_t = r_2 - c/a r_1,     a y_t = r_1 - K^T s_t
     """
 
-    def __init__(self, A: StepMatrix, B: StepMatrix, lu: Any) -> None:
+    def __init__(self, A: StepMatrix, B: StepMatrix, lu: Any, steps: int) -> None:
         from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
         self.A, self.B, self.lu = A, B, lu
@@ -31,7 +45,11 @@ class StepMarch:
         self._gttrs, self._gbmv = gttrs[0], gbmv[0]
         self.by_u = stored(B.K.plus(-B.a / A.a, A.K))
         self.by_v = stored(B.D.plus(-B.b / A.a, A.K))
-        self.K_T, self.K_before_T, self.D_before_T = stored(A.K.T), stored(B.K.T), stored(B.D.T)
+        real = not any(np.iscomplexobj(part) for part in (self.by_u, self.by_v, *lu))
+        self._compiled = compiled() if real and steps * A.K.main.size >= WORTH else None
+        self._weights = tuple(float(np.real(x)) for x in (A.a, A.b, B.a, B.b))
+        self.K, self.K_T = stored(A.K), stored(A.K.T)
+        self.K_before_T, self.D_before_T = stored(B.K.T), stored(B.D.T)
 
     def _add(self, factor: float, y: Array, M: Array, x: Array) -> Array:
         """y + factor M x, in place of y."""
@@ -41,9 +59,15 @@ class StepMarch:
     def forward(self, b: Array, z: Array) -> Array:
         """z_t (k, 2 N), from z (2 N,) before them."""
         A, B, N = self.A, self.B, b.shape[1] // 2
-        rows = np.empty(b.shape, np.result_type(self.by_u, b, z))
+        dtype = np.result_type(self.by_u, b, z)
+        if self._compiled is not None and dtype == np.float64:
+            rows = b.astype(dtype)
+            given = self.K, self.by_u, self.by_v, *self._compiled.factors(self.lu), *self._weights
+            self._compiled.forward(rows, *given, z[:N].astype(dtype), z[N:].astype(dtype))
+            return rows
+        rows = np.empty(b.shape, dtype)
         u, v, of_u = z[:N], z[N:], b[:, :N] / A.a
-        of_v = np.ascontiguousarray(b[:, N:] - A.K.rows(of_u), dtype=rows.dtype)
+        of_v = np.ascontiguousarray(b[:, N:] - A.K.rows(of_u), dtype=dtype)
         for t in range(len(b)):
             r = self._add(-1.0, self._add(-1.0, of_v[t], self.by_u, u), self.by_v, v)
             new, _ = self._gttrs(*self.lu, r, overwrite_b=True)
@@ -58,6 +82,10 @@ class StepMarch:
         A, B, N = self.A, self.B, b.shape[1] // 2
         rows = np.array(b, dtype=np.result_type(self.by_u, b, mu))
         by_u, by_v = mu[:N].astype(rows.dtype), mu[N:].astype(rows.dtype)
+        if self._compiled is not None and rows.dtype == np.float64:
+            given = self.K_T, self.K_before_T, self.D_before_T, *self._compiled.factors(self.lu), *self._weights
+            self._compiled.backward(rows, *given, by_u, by_v)
+            return rows, np.concatenate([by_u, by_v])
         for t in range(len(b))[::-1]:
             r, q = rows[t, :N], rows[t, N:]
             r -= by_u

@@ -279,6 +279,13 @@ def test_steps_marched_again_are_declared(cli) -> None:
             assert row["work"] == row["predicted_work"], (problem, row["route"])
 
 
+def test_more_states_than_steps_are_wrong_usage(cli) -> None:
+    problem, route = "vibrating-bar[n=3,steps=6]", "adjoint[checkpoint=every=7]"
+    ran = cli("run", "--no-store", "--no-timing", "--problem", problem, "--route", route)
+    assert ran.code == 2
+    assert "checkpoint=every=7 of 6 steps - choose 1 to 6" in ran.err
+
+
 def test_an_explicit_step_beyond_its_limit_is_refused() -> None:
     """2 / omega_max of the chain, bounded by the largest row: 2 sqrt(m / 4 k), 0.25 s."""
     with pytest.raises(DomainError, match=r"dt=0.3 is beyond 0.25, up to which central differences are stable"):
