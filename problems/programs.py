@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -105,7 +106,7 @@ def _copied(part: Any, done: dict[int, Any]) -> Any:
     if isinstance(part, (ClosedJaxpr, Jaxpr)) and id(part) not in done:
         given: Any = part
         if isinstance(part, ClosedJaxpr):
-            consts = [np.array(constant) for constant in part.consts]
+            consts = [deepcopy(constant) for constant in part.consts]  # of JAX's own types, which it needs
             done[id(part)] = given.replace(jaxpr=_copied(part.jaxpr, done), consts=consts)
         else:
             done[id(part)] = given.replace(eqns=[eqn.replace(params=_copied(eqn.params, done)) for eqn in part.eqns])
