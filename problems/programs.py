@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from copy import deepcopy
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,6 +19,7 @@ from gradient_routes.problems.jax64 import jax
 Made = TypeVar("Made")
 KEPT = 64  # of the latest
 LARGEST = 10**6  # bytes of constants of what is kept
+KNOWN = tuple(str(Path(file).parent) for file in (__file__, jax.__file__))
 _kept: OrderedDict[Hashable, Any] = OrderedDict()
 
 
@@ -43,7 +46,7 @@ def shared(make: Callable[..., Made], kind: str, *programs: ClosedJaxpr | None) 
 
 def said(part: Any) -> Hashable:
     """All that a program, or a part of one, computes: equal where operations, shapes and constants are, to the last
-    bit. What is neither, such as a derivative that an author has given, is equal to itself only.
+    bit. One with a derivative that its author has given equals no other, as that is traced later.
     """
     if isinstance(part, ClosedJaxpr):
         return said(part.jaxpr), said(part.consts)
@@ -81,9 +84,17 @@ def _lines(jaxpr: Any) -> Hashable:
         return names.setdefault(variable, len(names)), variable.aval
 
     def line(eqn: Any) -> Hashable:
+        if eqn.primitive.name.startswith("custom_") and not _known(eqn):
+            return object()
         return eqn.primitive, *map(name, eqn.invars), said(eqn.params), *map(name, eqn.outvars)
 
     return tuple(map(name, (*jaxpr.constvars, *jaxpr.invars))), *map(line, jaxpr.eqns), *map(name, jaxpr.outvars)
+
+
+def _known(eqn: Any) -> bool:
+    """Whether a function with a derivative of its own is JAX's or of this package: these depend on nothing else."""
+    value = eqn.params.get("call_jaxpr")
+    return value is not None and str(value.jaxpr.debug_info.func_filename).startswith(KNOWN)
 
 
 def _copied(part: Any, done: dict[int, Any]) -> Any:
@@ -95,7 +106,7 @@ def _copied(part: Any, done: dict[int, Any]) -> Any:
     if isinstance(part, (ClosedJaxpr, Jaxpr)) and id(part) not in done:
         given: Any = part
         if isinstance(part, ClosedJaxpr):
-            consts = [np.array(constant) for constant in part.consts]
+            consts = [deepcopy(constant) for constant in part.consts]  # of JAX's own types, which it needs
             done[id(part)] = given.replace(jaxpr=_copied(part.jaxpr, done), consts=consts)
         else:
             done[id(part)] = given.replace(eqns=[eqn.replace(params=_copied(eqn.params, done)) for eqn in part.eqns])
