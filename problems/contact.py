@@ -37,6 +37,10 @@ class ContactLaw(Protocol):
         """k = dq/dg [N/m]."""
         ...
 
+    def energy(self, g: Any) -> Any:
+        """The integral of q from -inf to g [J], g real."""
+        ...
+
     def active_set(self, g: Any) -> str | None:
         """open or closed; None for continuously differentiable q."""
         ...
@@ -53,6 +57,9 @@ class Penalty:
 
     def stiffness(self, g: Any) -> Any:
         return np.where(g.real > 0.0, self.k_c, 0.0)[()]
+
+    def energy(self, g: Any) -> Any:
+        return 0.5 * self.k_c * np.maximum(g, 0.0) ** 2
 
     def active_set(self, g: Any) -> str | None:
         return "closed" if g.real > 0.0 else "open"
@@ -77,6 +84,14 @@ class Softplus:
         e = np.exp(np.where(x.real > 0.0, -x, x))
         return (self.k_c * np.where(x.real > 0.0, 1.0, e) / (1.0 + e))[()]
 
+    def energy(self, g: Any) -> Any:
+        """-k_c w^2 Li_2(-exp(x)), x = g / w; beyond 0 by Li_2(-exp(x)) + Li_2(-exp(-x)) = -pi^2 / 6 - x^2 / 2."""
+        from scipy.special import spence  # Li_2(1 - z)
+
+        x = g / self.width
+        below = -spence(1.0 + np.exp(-np.abs(x)))
+        return self.k_c * self.width**2 * np.where(x > 0.0, np.pi**2 / 6.0 + x**2 / 2.0 - below, below)
+
     def active_set(self, g: Any) -> str | None:
         return None
 
@@ -96,6 +111,11 @@ class Quadratic:
     def stiffness(self, g: Any) -> Any:
         w = self.width
         return np.where(g.real < -w, 0.0, np.where(g.real > w, self.k_c, self.k_c * (g + w) / (2.0 * w)))[()]
+
+    def energy(self, g: Any) -> Any:
+        w = self.width
+        rounded = np.maximum(g + w, 0.0) ** 3 / (12.0 * w)
+        return self.k_c * np.where(g > w, 0.5 * g**2 + w**2 / 6.0, rounded)
 
     def active_set(self, g: Any) -> str | None:
         return None

@@ -206,6 +206,10 @@ class Transient(Problem):
         lin = self.linearize(u, p)
         return ParameterView({"by u_0": initial, "by rates": lin.J_p + lin.R_p.T @ lam - initial})
 
+    def energy_growth(self, u: Array, p: Array) -> float | None:
+        """By which part the largest energy exceeds that at the end of the load; None where there is none to tell."""
+        return None
+
     def active_set(self, u: Array, p: Array) -> ActiveSteps | None:
         sets = [self.step_active_set(t, u_t, p) for t, u_t in enumerate(u.reshape(self.steps, -1), start=1)]
         return None if sets[0] is None else ActiveSteps(sets)

@@ -350,6 +350,19 @@ class VibratingBar(Transient):
 
         return Traced(residual, lambda U, p: self.readings.misfit(U, jnp) + self.phi(p, jnp))
 
+    def energy(self, states: Array, p: Array) -> Array:
+        """Kinetic energy, and that of elements and stops, (k,) [J], of real states (k, 2 N)."""
+        x, v = self.histories(states)
+        E = 0.5 * (self.stiffness(p) * _elongation(x, np) ** 2).sum(axis=1) + 0.5 * (self.mass * v**2).sum(axis=1)
+        return np.asarray(E if self.stop is None else E + self.stop.law.energy(x[:, -1] - self.stop.gap))
+
+    def energy_growth(self, u: Array, p: Array) -> float | None:
+        states, free = u.reshape(self.steps, -1), int(np.flatnonzero(self.F).max(initial=0))
+        if free >= self.steps:
+            return None
+        E = self.energy(states[free:], p)
+        return float(E.max() / E[0] - 1.0)
+
     # --- data
 
     def observation(self, u: Array, p: Array) -> Observation:

@@ -27,6 +27,9 @@ class BothSides:
     def stiffness(self, g: Any) -> Any:
         return self.law.stiffness(g) + self.law.stiffness(-g - 2.0 * self.gap)
 
+    def energy(self, g: Any) -> Any:
+        return self.law.energy(g) + self.law.energy(-g - 2.0 * self.gap)
+
     def active_set(self, g: Any) -> str | None:
         behind = self.law.active_set(-g - 2.0 * self.gap)
         return "behind" if behind == "closed" else self.law.active_set(g)

@@ -13,6 +13,7 @@ from test_routes import differentiate, ids, reference
 from gradient_routes.bench.execution.references import error
 from gradient_routes.problems.bar import Bar, true_modulus
 from gradient_routes.problems.contact import CompliantStop, ContactLaw, Penalty, Quadratic, Softplus
+from gradient_routes.problems.dynamics.both_sides import BothSides
 from gradient_routes.problems.errors import InputError, NotConverged
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.routes.adjoint import adjoint
@@ -27,6 +28,16 @@ LAWS = (Penalty(50.0), Softplus(50.0, 0.02), Quadratic(50.0, 0.02))
 STOPS = ("penalty", "softplus", "quadratic", "multiplier")
 FADING = ("penalty", "quadratic", "multiplier")
 by_stop = pytest.mark.parametrize("stop", STOPS)
+
+
+@pytest.mark.parametrize("law", [*LAWS, BothSides(LAWS[1], 0.05)], ids=lambda law: type(law).__name__)
+def test_forces_are_the_derivative_of_their_energy(law: ContactLaw) -> None:
+    """Gauss' rule, exact for the polynomials between the kinks at -0.02, 0 and 0.02."""
+    x, w = np.polynomial.legendre.leggauss(16)
+    for a, b in pairwise([-0.12, -0.1, -0.08, -0.02, 0.0, 0.02, 0.1]):
+        g = 0.5 * (a + b) + 0.5 * (b - a) * x
+        work = 0.5 * (b - a) * (w @ law.force(g))
+        assert law.energy(np.float64(b)) - law.energy(np.float64(a)) == pytest.approx(work, rel=1e-11, abs=1e-15)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)

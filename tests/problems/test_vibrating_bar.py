@@ -74,9 +74,23 @@ def test_the_trapezoidal_rule_keeps_the_energy_of_a_free_bar(damping: str) -> No
     k = bar.stiffness(bar.parameters.start)
     stretch = np.diff(u, axis=1, prepend=0.0)
     energy = 0.5 * (k * stretch**2).sum(axis=1) + 0.5 * (bar.mass * v**2).sum(axis=1)
+    np.testing.assert_allclose(bar.energy(np.hstack([u, v]), bar.parameters.start), energy, rtol=1e-14)
     free = energy[6:]
     assert np.ptp(free) < 1e-13 * free[0]
     assert free[0] > 0.01
+    assert bar.energy_growth(np.hstack([u, v]).ravel(), bar.parameters.start) < 1e-13
+
+
+def test_energy_that_the_trapezoidal_rule_adds_at_a_stiff_stop_is_told() -> None:
+    """It is bounded for linear forces alone; shorter steps add less."""
+    grown = []
+    for dt in (0.05, 0.0125):
+        bar = made(n=3, steps=round(2.4 / dt), dt=dt, stop="penalty", stops="both", gap=0.05, k_c=1000.0)
+        p = bar.parameters.start
+        grown.append(bar.energy_growth(Model(bar).solve(p).u, p))
+    assert grown[0] > 0.3
+    assert grown[1] < 0.1 * grown[0]
+    assert made(n=3, steps=2).energy_growth(np.zeros(12), p) is None
 
 
 @pytest.mark.parametrize("damping", DAMPINGS)

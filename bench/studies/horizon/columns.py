@@ -18,5 +18,6 @@ HORIZON = (
     Column("slope_scatter", "REAL", "problem's", "their standard deviation"),
     Column("quotient", "REAL", "problem's", "difference of J over the interval / its length"),
     Column("flips", "INTEGER", "1", "steps whose active set differs between its ends; NULL where there are no sets"),
+    Column("energy_growth", "REAL", "1", "largest energy after the load / that at its end - 1; NULL if unknown"),
     Column("verdict", "TEXT", "", "smooth, noisy or biased: what slopes say of the quotient"),
 )

@@ -18,14 +18,12 @@ def section(source: Source) -> Section | None:
 
 def curves(rows: list[Row]) -> Figure:
     misled = [f"{row['verdict']} at T = {row['steps']}" for row in rows if row["verdict"] != "smooth"]
-    columns = (
-        "problem at spread places steps objective gradient_norm slope slope_mean slope_scatter quotient flips verdict"
-    )
+    columns = "problem at spread places steps objective gradient_norm slope slope_mean slope_scatter quotient"
     return Figure(
         "horizon",
         "Slopes of J against the length of the march",
         f"{'; '.join(misled[:3])}." if misled else "Slopes are those of J at every length.",
-        tabulate("horizon", rows, columns),
+        tabulate("horizon", rows, f"{columns} flips energy_growth verdict"),
         "line",
         x=(Axis("steps", "T, steps", scale="log"),),
         y=(

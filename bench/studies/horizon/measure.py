@@ -21,7 +21,7 @@ from gradient_routes.bench.studies.judged import said
 from gradient_routes.bench.studies.options import one_problem
 from gradient_routes.problems.errors import DomainError, InputError, NotConverged, Overflow, SingularMatrix
 from gradient_routes.problems.problem import Array, Offers, Problem
-from gradient_routes.problems.transient import ActiveSteps
+from gradient_routes.problems.transient import ActiveSteps, Transient
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
@@ -46,6 +46,7 @@ class Horizon:
     slope_scatter: float | None = None
     quotient: float | None = None
     flips: int | None = None
+    energy_growth: float | None = None
     verdict: str | None = None
 
 
@@ -90,7 +91,7 @@ def horizon(
 ) -> Horizons:
     """Marches of 1, 2, 4, .. steps and of all, until `budget` [s] is spent. Raises InputError, DomainError."""
     problem = spec()
-    if not problem.steps or "steps" not in spec.options:
+    if not isinstance(problem, Transient) or "steps" not in spec.options:
         raise InputError(f"horizon: {problem.name} has no option steps - name a problem that marches in time")
     route = adjoint if Offers.LINEARIZE in problem.offers else implicit_ad
     if (objection := route.objection(problem)) is not None:
@@ -106,6 +107,7 @@ def horizon(
             continue
         try:
             march = replace(spec, options=spec.options | {"steps": steps})()
+            assert isinstance(march, Transient)
             marches.append(measured(march, p, route, spread, places, solver or Solver()))
         except (DomainError, InputError, NotConverged, Overflow, SingularMatrix) as failure:
             marches.append(Horizon(steps, "failed", said(failure)))
@@ -117,7 +119,7 @@ def lengths(most: int) -> list[int]:
     return [*(2**k for k in range(most.bit_length()) if 2**k < most), most]
 
 
-def measured(problem: Problem, p: Array, route: Any, spread: float, places: int, solver: Solver) -> Horizon:
+def measured(problem: Transient, p: Array, route: Any, spread: float, places: int, solver: Solver) -> Horizon:
     """Slopes in the middles of `places` equal parts of the interval, and J at its ends."""
     natural = problem.parameters.natural(p)
     v = natural * np.random.default_rng(0).choice([-1.0, 1.0], len(p)) / np.sqrt(len(p))
@@ -137,6 +139,7 @@ def measured(problem: Problem, p: Array, route: Any, spread: float, places: int,
         slope_scatter=float(slopes.std(ddof=1)),
         quotient=quotient,
         flips=flips(problem, [(end.u, end.p) for end in ends]),
+        energy_growth=None if here.u is None else problem.energy_growth(here.u, p),
         verdict=verdict(slopes, quotient),
     )
 

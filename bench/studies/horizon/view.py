@@ -15,7 +15,7 @@ from gradient_routes.bench.studies.horizon.measure import Horizons
 LEGEND = (
     "|dJ/dp|: in natural changes of p; slope: dJ/dp . v at p, v one direction; mean, scatter: of slopes in the interval"
     "\nquotient: (J(S) - J(-S)) / 2 S, the mean of all slopes in it where J is continuous; flips: steps whose contact"
-    " differs at its ends"
+    " differs at its ends\nenergy: growth of the largest after the load over that at its end"
 )
 SAYS = {
     "noisy": "slopes scatter there: one gradient is a noisy estimate of how J changes",
@@ -45,14 +45,15 @@ def curves(rows: list[Row], width: int) -> Text:
 
 
 def table(rows: list[Row]) -> Table:
-    out = tables.columns("T", "J", "|dJ/dp|", "slope", "mean", "scatter", "quotient", "flips", ("", None))
+    out = tables.columns("T", "J", "|dJ/dp|", "slope", "mean", "scatter", "quotient", "flips", "energy", ("", None))
     names = ("objective", "gradient_norm", "slope", "slope_mean", "slope_scatter", "quotient")
     for row in rows:
         if row["status"] == "ok":
             flips = "" if row["flips"] is None else str(row["flips"])
-            out.add_row(str(row["steps"]), *(number(row[name], 3) for name in names), flips, row["verdict"])
+            energy = "" if row["energy_growth"] is None else f"{row['energy_growth']:+.1e}"
+            out.add_row(str(row["steps"]), *(number(row[name], 3) for name in names), flips, energy, row["verdict"])
         else:
-            out.add_row(str(row["steps"]), *[""] * 7, row["status"])
+            out.add_row(str(row["steps"]), *[""] * 8, row["status"])
     return out
 
 
