@@ -1,6 +1,6 @@
 """Projective dynamics against Newton's method, in time and at rest: CPU time of one thread, ratios within one run.
 
-    OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 python -m benchmarks.projective          3 minutes
+    OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 python -m benchmarks.projective          20 minutes beside other work
 
 Each pair is timed in turns, three times; the median of the ratios is printed. In time: impact-block[law=arap] until it
 has touched. At rest: block[law=arap] under its traction, by global steps with the Laplacian alone.

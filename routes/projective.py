@@ -132,7 +132,7 @@ class Projective:
                 return done.x
             what = done.breakdown or f"a product contracts |b - A y| by {done.rate:.2g} only"
             raise NotConverged(f"{self.problem.name}: adjoint of a step by {done.products} products: {what}", ())
-        y, k = substitute(b), 0
+        y, r, k = substitute(b), b, 0
         while k < AT_MOST and np.isfinite(y).all():
             r, k = b - product(y), k + 1
             y = y + substitute(r)

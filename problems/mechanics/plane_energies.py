@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.mechanics.materials import LAWS, Energy
 from gradient_routes.problems.mechanics.plane_laws import AT_MOST, CLOSE, E_33, newton_step, placement
@@ -21,8 +23,17 @@ def plane_energy(name: str, kind: Kind) -> Energy:
     return linear_plane_stress(_placed(W, T)) if name == "linear" else plane_stress(W, T)
 
 
+def placed(H: Any, T: Array) -> Any:
+    """T H, (3, 3), every entry of which is one of H or 0.
+
+    By its index, as JAX 0.10 refuses to linearize a compiled custom_jvp of a product with a NumPy array.
+    """
+    index = np.where(T.any(axis=1), T.argmax(axis=1), T.shape[1])
+    return jnp.append(H.ravel(), 0.0)[index].reshape(3, 3)
+
+
 def _placed(W: Energy, T: Array) -> Energy:
-    return lambda H, q: W((T @ H.ravel()).reshape(3, 3), q)
+    return lambda H, q: W(placed(H, T), q)
 
 
 def linear_plane_stress(W: Energy) -> Energy:
@@ -39,7 +50,7 @@ def plane_stress(W: Energy, T: Array) -> Energy:
     """min over h of W(T H + h e), differentiable to any order."""
 
     def at(H: Any, h: Any, q: Any) -> Any:
-        return W((T @ H.ravel()).reshape(3, 3) + h * E_33, q)
+        return W(placed(H, T) + h * E_33, q)
 
     def P_33(H: Any, h: Any, q: Any) -> Any:
         return jax.jvp(lambda h: at(H, h, q), (h,), (jnp.ones_like(h),))[1]

@@ -16,7 +16,6 @@ from gradient_routes.problems.jax64 import jax, jnp
 from gradient_routes.problems.problem import Offers
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
-from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.synthetic_data import with_synthetic_data
@@ -25,13 +24,19 @@ from gradient_routes.routes.tangent import tangent
 COLUMN: dict[str, Any] = {"nx": 1, "ny": 1, "nz": 2, "steps": 4, "dt": 0.15, "velocity": "0.3"}
 STOPS: dict[str, dict[str, Any]] = {
     "softplus": {"stop": "softplus", "width": 0.02},
-    "quadratic": {"stop": "quadratic", "width": 0.02},
     "penalty": {"stop": "penalty"},
 }
 
 
 def made(**options: Any) -> ImpactBlock:
     return with_synthetic_data(ImpactBlock(**COLUMN | options))
+
+
+def thrown(**options: Any) -> ImpactBlock:
+    """Where no data are asked for."""
+    block = ImpactBlock(**COLUMN | options).twin()
+    assert block is not None
+    return block
 
 
 def solved(block: ImpactBlock) -> tuple[Any, Any]:
@@ -46,23 +51,24 @@ def moved(block: ImpactBlock, v: Any) -> Any:
 
 
 def test_every_route_gives_the_gradient_of_complex_steps_at_the_declared_work(cli) -> None:
-    selector = "impact-block[nx=1,ny=1,nz=2,steps=4,dt=0.15,velocity=0.3,alpha=0.1]"
+    """Of the smooth law the guide shows them. The second derivative of the quadratic law jumps: 1e-10."""
+    selector = "impact-block[n=1,steps=3,dt=0.15,velocity=0.4,stop=quadratic,width=0.02,alpha=0.1]"
     rows = cli("run", "--json", "--no-store", "--no-timing", "--problem", selector, "--route", "all").rows
-    accuracy = {route.name: route.accuracy or 1e-12 for route in ROUTES}
+    accuracy = {route.name: route.accuracy or 1e-10 for route in ROUTES}
     assert accuracy.keys() == {row["route"].partition("[")[0] for row in rows}
     for row in rows:
         assert row["gradient_error"] < accuracy[row["route"].partition("[")[0]], row["route"]
         assert row["work"] == row["predicted_work"], row["route"]
 
 
-@pytest.mark.parametrize("stop", ["quadratic", "penalty"])
-def test_gradients_hold_on_each_branch_of_a_law_in_pieces(stop: str) -> None:
-    """The second derivative of the quadratic law jumps: 1e-10; of the penalty no node is within rounding of a kink."""
+@pytest.mark.parametrize("stop", ["softplus", "penalty"])
+def test_gradients_of_constants_hold(stop: str) -> None:
+    """Of the penalty no node is within rounding of a kink."""
     block = made(mass="lumped", unknown="constants", **STOPS[stop])
     model, p = Model(block, Solver(rtol=1e-14)), block.parameters.start
     exact = complex_step.prepare(model, p)(p).gradient
-    for route in (tangent, adjoint, implicit_ad):
-        assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-10, route.name
+    for route in (tangent, adjoint):
+        assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
 
 
 def test_checkpoints_change_steps_not_the_gradient() -> None:
@@ -80,7 +86,7 @@ def test_checkpoints_change_steps_not_the_gradient() -> None:
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
 def test_a_throw_is_rigid_until_it_touches_and_has_all_the_mass(element: str, mass: str) -> None:
     """Along x besides, which the plane does not change; momentum is rho V v."""
-    block = made(
+    block = thrown(
         velocity="0.1,0,-0.3", stop="penalty", element=element, mass=mass, size="1,1,2", density=3.0, steps=2, dt=0.1
     )
     u, v = solved(block)
@@ -97,7 +103,7 @@ def test_a_throw_is_rigid_until_it_touches_and_has_all_the_mass(element: str, ma
 
 def test_the_plane_changes_momentum_by_its_impulse_and_no_energy() -> None:
     """A linear body: half the sum of u.K u and v.M v, and of a linear spring while it is pressed."""
-    block = made(law="linear", stop="penalty", steps=12, dt=0.1)
+    block = thrown(law="linear", stop="penalty", steps=12, dt=0.1)
     p, (u, v) = block.parameters.start, solved(block)
     pressed = -np.stack([block.plane.forces(x) for x in u]).sum(axis=1)
     gained = np.diff(moved(block, v)[:, 2::3].sum(axis=1))
@@ -127,9 +133,9 @@ def test_a_column_moves_as_a_fine_integrator_says() -> None:
         return np.concatenate([z[2:], np.linalg.solve(M, f)])
 
     exact = solve_ivp(rate, (0.0, end), [0.0, 0.0, -0.3, -0.3], "DOP853", rtol=1e-10, atol=1e-12).y[:2, -1]
-    for steps in (24, 48):
+    for steps in (16, 32):
         options = {"nz": 1, "nu": 0.0, "k_c": k_c, "width": w}
-        block = made(steps=steps, dt=end / steps, **options)
+        block = thrown(steps=steps, dt=end / steps, **options)
         u, _ = solved(block)
         z, height = u[-1].reshape(-1, 3)[:, 2], block.solid.mesh.geometry.X[:, 2]
         off.append(max(abs(z[height == 0.0] - exact[0]).max(), abs(z[height == 1.0] - exact[1]).max()))

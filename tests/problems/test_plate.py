@@ -25,6 +25,7 @@ from gradient_routes.problems.plate import DIRECTIONS, Plate
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
+from gradient_routes.routes.implicit_ad import implicit_ad
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.synthetic_data import with_synthetic_data
@@ -389,3 +390,11 @@ def test_meshes_that_are_no_plates_are_refused(kind: str, points: Any, cells: An
     meshio.Mesh(np.array(points, dtype=float), [(kind, np.array(cells))]).write(path)
     with pytest.raises(InputError, match=says):
         Plate(mesh=str(path), kind="axisymmetric")
+
+
+def test_automatic_differentiation_takes_the_law_arap_in_a_plane() -> None:
+    """Its rotation has derivatives of its own, which JAX differentiates compiled."""
+    plate = Plate(n=1, law="arap", kind="plane-strain", derivatives="hand")
+    model, p = Model(plate), plate.parameters.start
+    by_hand = adjoint.prepare(model, p)(p).gradient
+    assert relative_error(implicit_ad.prepare(model, p)(p).gradient, by_hand) < 1e-12
