@@ -22,7 +22,7 @@ QUESTION = ("problem", "problem_options", "at", "route", "route_options")
 
 STUDY = Study(
     name="scaling",
-    question="How do time, memory, work grow with unknowns, parameters, steps, iterations, and how far is a route?",
+    question="How do time, memory, work grow with unknowns, parameters, steps, iterations; how far do routes get?",
     help="""A route ends where the next size is over the budget, or reaches another cap. On one affordable size tangent,
     finite differences and adjoint are then timed in turn on 1, 2, 4 ... of the parameters: the n_p from which one is
     cheaper is fitted, and shown beside what the cost model predicts. A grid of iterations is fitted as well:

@@ -102,7 +102,10 @@ def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int, coun
 def _start(spec: ProblemSpec, first: int | None, axis: str) -> int:
     option = declared_by(spec.build).options.get(axis)
     if option is None or int not in option.kinds:
-        raise InputError(f"{spec.name}: has no whole number {axis} to climb by - give a grid: '{spec.name}[KEY=1|2|4]'")
+        grid = f"'{spec.name}[KEY=1|2|4]'"
+        raise InputError(
+            f"{spec.name}: has no whole number {axis} to climb by - give a grid: {grid}, or another --axis"
+        )
     start = spec.options[axis] if first is None else first
     if start is None or start < 1:
         raise InputError(f"{spec.name}: {axis}={start} is no size - say where to begin: --from N")
