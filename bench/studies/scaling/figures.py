@@ -16,7 +16,7 @@ from gradient_routes.bench.studies.bill.figures import DOUBT, FORWARD, GUIDES, H
 from gradient_routes.bench.studies.tolerance.figures import without_following
 
 FEWEST = 3  # sizes of a family that make a curve
-SIZES = ("n", "nx", "ny", "nz")  # options of problems that make their size
+SIZES = ("n", "nx", "ny", "nz", "steps")  # options of problems that make their size
 PAIR = text("pair", "the two routes compared")
 
 
