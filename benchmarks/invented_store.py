@@ -297,7 +297,15 @@ def scaling(problem: str, n: int, rng: np.random.Generator) -> Tables:
         | {"says": f"adjoint is cheaper than {other} from n_p = {at:g} on"}
         for other, at in (("tangent", 2.0), ("fd-one-sided", 1.4))
     ]
-    return {"scaling_fits": fits, "break_even": races}
+    T = 64 * n
+    marches: list[Row] = [
+        on(problem, n)
+        | {"route": "adjoint", "route_options": {"checkpoint": f"every={k}"}, "steps": T, "interval": k}
+        | {"states_kept": T // k + k, "state_bytes": 16 * n * (T // k + k), "recomputed": (k - 1) * ((T - 1) // k)}
+        | {"peak_bytes": 2e6 + 16 * n * (T // k + k), "seconds": 1.0, "least": "measured" if k == 8 * n**0.5 else None}
+        for k in (4, 16, 64)
+    ]
+    return {"scaling_fits": fits, "break_even": races, "checkpoints": marches}
 
 
 def consistency(problem: str, n: int, rng: np.random.Generator) -> Tables:

@@ -56,6 +56,15 @@ class Schedule:
             r += 1
         return r * steps - comb(s + r, r - 1) - steps + 1 if r else 0
 
+    def kept(self, steps: int) -> int:
+        """States held at once, u_0 among them: floor((T - 1)/k) and those of the last interval or k for every=k, the
+        longer; s for revolve=s. The state before and after the step that is reversed come on top.
+        """
+        if self.kind == "revolve":
+            return self.count
+        intervals = (steps - 1) // self.count
+        return intervals + max(steps - intervals * self.count + 1, self.count if intervals else 0)
+
     def backwards(self, march: March, u_0: Array, steps: int, together: int = 1) -> Iterator[Stretch]:
         """t_0 and u_{t_0}..u_{t_1} of steps T..1, `together` steps at once where they are at hand."""
         if self.kind == "every":

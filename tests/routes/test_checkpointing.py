@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from functools import cache
 
 import numpy as np
@@ -54,6 +55,24 @@ def test_steps_are_those_of_the_formula_and_the_fewest_there_can_be(T: int) -> N
 def test_ten_thousand_steps_from_a_hundred_states() -> None:
     assert steps_of("revolve=100", 10_000) == 10_000 + 14_748
     assert steps_of("sqrt", 10_000) == 10_000 + 9_801
+
+
+@pytest.mark.parametrize("text", ["all", "every=1", "every=4", "every=7", "sqrt", "every=29", "revolve=5", "none"])
+def test_states_held_at_once_are_those_that_are_told(text: str) -> None:
+    """By the allocations of a march of large states; up to seven come and go beside those that are kept."""
+    n, T = 2**14, 30
+    schedule = Schedule.of(text, T, "march")
+
+    def march(t_0: int, t_1: int, before: np.ndarray) -> np.ndarray:
+        return np.zeros((t_1 - t_0 + 1, n))
+
+    u_0 = np.zeros(n)
+    tracemalloc.start()
+    for _ in schedule.backwards(march, u_0, T):
+        pass
+    held = 1 + tracemalloc.get_traced_memory()[1] / u_0.nbytes
+    tracemalloc.stop()
+    assert schedule.kept(T) <= held <= schedule.kept(T) + 7.1
 
 
 @pytest.mark.parametrize("text", ["every=0", "revolve=11", "every=-1", "half", "revolve=", "every=1e3"])

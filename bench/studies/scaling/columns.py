@@ -10,8 +10,13 @@ SCALING_FITS = (
     Column("at", "TEXT", "", "the p it was differentiated at: start, true or a file"),
     Column("route", "TEXT", "", "name of the route"),
     Column("route_options", "TEXT", "", "its options as asked for; data-dependent ones NULL", json=True),
-    Column("quantity", "TEXT", "", "column of cases, iterations (of all Newton steps), substitutions or products"),
-    Column("against", "TEXT", "", "x: n_state, n_param or iterations; n_state alone where n_p is a multiple of n_u"),
+    Column(
+        "quantity",
+        "TEXT",
+        "",
+        "column of cases, iterations (of all Newton steps), or substitutions, products, steps recomputed",
+    ),
+    Column("against", "TEXT", "", "x: n_state (alone where n_p is a multiple of n_u), n_param, steps or iterations"),
     Column("law", "TEXT", "", "quantity = constant + prefactor x^exponent: affine, exactly; power, fitted; NULL, none"),
     Column("no_law", "TEXT", "", "why there is none"),
     Column("exponent", "REAL", "1", "of x; 0 or 1 where exact"),
@@ -29,6 +34,20 @@ SCALING_FITS = (
     Column("most", "REAL", "quantity's", "the most"),
     Column("largest", "INTEGER", "1", "the largest x at which the route gave a gradient"),
     Column("stopped_by", "TEXT", "", "why at no larger one"),
+)
+
+CHECKPOINTS = (
+    *PROBLEM,
+    Column("route", "TEXT", "", "name of a route that marches back"),
+    Column("route_options", "TEXT", "", "its options", json=True),
+    Column("steps", "INTEGER", "1", "T, of the march"),
+    Column("interval", "INTEGER", "1", "k: states after 0, k, 2 k, .. steps are kept; NULL for revolve and none"),
+    Column("states_kept", "INTEGER", "1", "the most of them at once, by the schedule, u_0 among them"),
+    Column("state_bytes", "INTEGER", "byte", "what these hold"),
+    Column("recomputed", "INTEGER", "1", "steps that were marched again, counted"),
+    Column("seconds", "REAL", "s", "gradient, median of the steady samples"),
+    Column("peak_bytes", "INTEGER", "byte", "peak memory of one call, as in cases"),
+    Column("least", "TEXT", "", "of all k at this T: measured, the least peak_bytes; counted, the fewest states"),
 )
 
 BREAK_EVEN = (

@@ -10,11 +10,13 @@ from gradient_routes.bench.render.figure import Axis, Figure, Guide, Section, To
 from gradient_routes.bench.render.format import number, seconds
 from gradient_routes.bench.render.picking import doubt, each, grouped, tabulate, text
 from gradient_routes.bench.render.source import Source, selector
+from gradient_routes.bench.render.style import bare
+from gradient_routes.bench.render.terminal.tables import RESOLUTION
 from gradient_routes.bench.studies.bill.figures import DOUBT, FORWARD, GUIDES, HOLLOW, MEMORY, SECONDS, TAPE
 from gradient_routes.bench.studies.tolerance.figures import without_following
 
 FEWEST = 3  # sizes of a family that make a curve
-SIZES = ("n", "nx", "ny", "nz")  # options of problems that make their size
+SIZES = ("n", "nx", "ny", "nz", "steps")  # options of problems that make their size
 PAIR = text("pair", "the two routes compared")
 
 
@@ -23,6 +25,7 @@ def section(source: Source) -> Section | None:
         *growth(source.answered),
         exponents(source.table("scaling_fits")),
         crossing(source.table("break_even")),
+        over_intervals(source.table("checkpoints")),
     )
     drawn = tuple(f for f in figures if f is not None)
     says = "The same problem at several sizes. Both axes are logarithmic: a slope is an exponent."
@@ -131,4 +134,28 @@ def crossing(races: Sequence[Row]) -> Figure | None:
         panels=each(rows, "problem"),
         routes=True,
         guides=(Guide("x", 1.0, "", below=True),),
+    )
+
+
+def over_intervals(marches: Sequence[Row]) -> Figure | None:
+    """Memory over the interval between states that a march keeps, a panel a problem, its steps among its options."""
+    rows = [row | {"note": "least" if row["least"] else None} for row in marches if row["interval"] is not None]
+    if not rows:
+        return None
+    found = [f"k = {row['interval']} on {row['problem']}, {row['least']}" for row in rows if row["least"]]
+    columns = "problem route steps interval states_kept state_bytes peak_bytes recomputed seconds least note"
+    return Figure(
+        "checkpoints",
+        "Memory against the interval between checkpoints",
+        "States after 0, k, 2 k, .. steps and those of one interval are kept: T/k + k, the fewest at k = √T. Peaks have"
+        f" in them all else that a call needs. Least: {'; '.join(found) or 'not found'}.",
+        tabulate("checkpoints", rows, columns, (text("note", "where memory is least over k"),)),
+        "line",
+        x=(Axis("interval", "k, steps between states kept", scale="log"),),
+        y=(Axis("", "memory", "byte", "log"),),
+        series=tuple(f" of {bare(row['route'])}" for row in rows),
+        panels=each(rows, "problem"),
+        fold={"peak_bytes": "peak", "state_bytes": "states kept"},
+        guides=(Guide("y", RESOLUTION, "peaks are not resolved below 1 MiB"),),
+        note="note",
     )

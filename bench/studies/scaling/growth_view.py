@@ -20,11 +20,11 @@ MEASURED = {
     "factor_bytes": "factors",
     "iterations": "iterations",
 }
-SHORT = dict(zip(WORK, ("fwd", "fac", "sub", "mv"), strict=True))
+SHORT = dict(zip(WORK, ("fwd", "fac", "sub", "mv", "again"), strict=True))
 LAWS = (
     "+-: 95 % confidence by Student's t, wide where sizes are few (--growth 2 gives more); without +-: exact counts\n"
     f"over: overhead, fitted along and taken away; sizes: those where it is below {100 * OVERHEAD:.0f} %\n"
-    "work: fwd forward solves, fac factorizations, sub substitutions, mv products with R_u"
+    "work: fwd forward solves, fac factorizations, sub substitutions, mv products with R_u, again steps marched again"
 )
 Cells = tuple[str, str, str, str]
 
@@ -52,7 +52,7 @@ def _by_route(growths: Sequence[Growth]) -> list[list[Growth]]:
 def symbols(done: Scaling) -> dict[str, str]:
     """n where n_u and n_p are one number."""
     same = all(row["n_state"] == row["n_param"] for row in done.rows if row["n_state"] is not None)
-    return {"n_state": "n" if same else "n_u", "n_param": "n_p", "iterations": "k"}
+    return {"n_state": "n" if same else "n_u", "n_param": "n_p", "steps": "T", "iterations": "k"}
 
 
 def legend(done: Scaling) -> str:

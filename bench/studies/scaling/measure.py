@@ -17,12 +17,12 @@ from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.execution.isolation.signals import Interrupt
 from gradient_routes.bench.execution.sweep import run
 from gradient_routes.bench.studies.scaling.break_even import Racing, break_even
+from gradient_routes.bench.studies.scaling.checkpoints import RESOLUTION, checkpoints, recomputed
 from gradient_routes.bench.studies.scaling.climbing import Climb, Measure, Series
 from gradient_routes.bench.studies.scaling.power_law import FEWEST, Fit, fit
 from gradient_routes.bench.studies.scaling.sizes import Sizes
 
-RESOLUTION = 2**20  # bytes; pages of allocators and interpreters come and go below
-WORK = ("forward_solves", "factorizations", "substitutions", "products")
+WORK = ("forward_solves", "factorizations", "substitutions", "products", "recomputed")
 QUANTITIES = ("seconds", "peak_bytes", "tape_bytes", "factor_bytes", "iterations", *WORK)
 COUNTED = ("tape_bytes", "factor_bytes", "iterations", *WORK)  # whole numbers without noise
 
@@ -58,6 +58,7 @@ class Scaling:
     rows: tuple[Row, ...] = field(repr=False)
     series: tuple[Series, ...] = field(repr=False)
     growths: tuple[Growth, ...] = field(repr=False)
+    checkpoints: tuple[Row, ...] = field(repr=False)
     break_evens: tuple[Row, ...] = field(repr=False)
     no_break_even: str | None = None
     interrupted: bool = False
@@ -65,7 +66,8 @@ class Scaling:
     @property
     def tables(self) -> dict[str, list[Row]]:
         """Those of the study alone: cases have theirs."""
-        return {"scaling_fits": [g.row for g in self.growths], "break_even": [*self.break_evens]}
+        fits = [g.row for g in self.growths]
+        return {"scaling_fits": fits, "break_even": [*self.break_evens], "checkpoints": [*self.checkpoints]}
 
 
 def scaling(
@@ -97,21 +99,26 @@ def scaling(
         climb.interrupt()
         interrupted = True
     growths = tuple(growths_of(sizes, climb.series, settings.at))
-    return Scaling(sizes, tuple(rows), tuple(climb.series), growths, tuple(races), reason, interrupted)
+    kept = tuple(checkpoints(rows))
+    return Scaling(sizes, tuple(rows), tuple(climb.series), growths, kept, tuple(races), reason, interrupted)
 
 
 def growths_of(sizes: Sizes, every: Sequence[Series], at: str) -> Iterator[Growth]:
     """Over sizes route by route, then over iterations where a grid of them was asked for."""
     if len(sizes.specs) > 1:
         for series in every:
-            for against in abscissas(series.rows):
+            for against in abscissas(sizes, series.rows):
                 yield from _over(sizes, series, at, against, series.rows)
     for series in iterated(every):
         yield from _over(sizes, series, at, "iterations", series.rows)
 
 
-def abscissas(rows: Sequence[Row]) -> tuple[str, ...]:
-    """n_u and n_p where both grow and neither is a multiple of the other; else the one that grows."""
+def abscissas(sizes: Sizes, rows: Sequence[Row]) -> tuple[str, ...]:
+    """T where only steps vary; n_u and n_p where both grow and neither is a multiple of the other; else the one that
+    grows.
+    """
+    if sizes.in_time:
+        return ("steps",)
     n_u, n_p = ([row[name] for row in rows] for name in ("n_state", "n_param"))
     if len(set(n_u)) < 2:
         return ("n_param",) if len(set(n_p)) > 1 else ("n_state",)
@@ -169,7 +176,9 @@ def _known(rows: Iterable[Row], against: str, quantity: str) -> list[tuple[float
 
 
 def abscissa(row: Row, name: str) -> float | None:
-    """n_u, n_p or the iterations of a row, those of all Newton steps together."""
+    """n_u, n_p, T or the iterations of a row, those of all Newton steps together."""
+    if name == "steps":
+        return int(row["problem_options"][name])
     if name != "iterations":
         return None if row[name] is None else int(row[name])
     k = row["route_options"].get("iterations")
@@ -178,6 +187,8 @@ def abscissa(row: Row, name: str) -> float | None:
 
 def value(row: Row, quantity: str) -> float | None:
     """What a row says about a quantity; None where it says nothing, or less than can be resolved."""
+    if quantity == "recomputed":
+        return recomputed(row)
     if quantity in WORK:
         return None if row["work"] is None else _counted(row["work"], quantity)
     if quantity == "iterations":

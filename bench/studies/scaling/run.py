@@ -25,6 +25,7 @@ from gradient_routes.bench.store.keeping import Keeper
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.options import routes_of
 from gradient_routes.bench.studies.scaling.break_even import BreakEvens, Racing, break_even
+from gradient_routes.bench.studies.scaling.checkpoints import check_intervals, every_kind
 from gradient_routes.bench.studies.scaling.climbing import Series
 from gradient_routes.bench.studies.scaling.measure import scaling
 from gradient_routes.bench.studies.scaling.sizes import Count, Sizes, sizes, unknowns
@@ -38,6 +39,7 @@ def run(
     selector: str,
     routes: Sequence[str],
     at: str,
+    axis: str | None,
     first: int | None,
     growth: float,
     levels: int,
@@ -49,10 +51,11 @@ def run(
     kept: Path | None,
 ) -> int:
     """Ctrl-C ends the study, not what it has measured."""
-    told = described([selector], routes, limits) if isolate else case.NOTHING
+    told = described([selector], routes or ["all"], limits) if isolate else case.NOTHING
     count = (lambda spec: int(called(unknowns, (spec,), limits))) if told else unknowns
-    asked = sizes_of(case.problems([selector], told), first, growth, levels, count)
-    specs = routes_of(routes, say, told)
+    asked = sizes_of(case.problems([selector], told), first, growth, levels, count, axis)
+    specs = routes_of(routes or every_kind(asked), say, told)
+    check_intervals(asked, specs)
     settings = Settings(at, budget, min_time, solver=solver)
     keeper = Keeper(None if kept is None else Store(kept))
     measure = partial(run_cases, how=How(isolate, limits))
@@ -83,13 +86,15 @@ def apart(race: Racing, limits: Limits, sizes: Sizes, every: list[Series], setti
     return found
 
 
-def sizes_of(specs: list[ProblemSpec], first: int | None, growth: float, levels: int, count: Count) -> Sizes:
+def sizes_of(
+    specs: list[ProblemSpec], first: int | None, growth: float, levels: int, count: Count, axis: str | None
+) -> Sizes:
     """What to measure on. Raises InputError."""
     if len(specs) > 1:
         refuse_given(("growth", "levels"), "the sizes are those of the grid")
         if first is not None:
             raise InputError("--from: the sizes are those of the grid - leave it out")
-    return sizes(specs, first, growth, levels, count)
+    return sizes(specs, first, growth, levels, count, axis)
 
 
 def tell(row: Row | None) -> None:

@@ -1,4 +1,4 @@
-"""The sizes of one problem: a grid of whole numbers that was asked for, or its option n, climbing."""
+"""The sizes of one problem: a grid of whole numbers that was asked for, or one of its options, climbing."""
 
 from __future__ import annotations
 
@@ -25,6 +25,11 @@ class Sizes:
     def family(self) -> dict[str, Any]:
         return {name: value for name, value in self.specs[0].options.items() if name not in self.varied}
 
+    @property
+    def in_time(self) -> bool:
+        """Whether it is the steps of a march that vary, and nothing else."""
+        return self.varied == ("steps",)
+
     def label(self, spec: ProblemSpec) -> str:
         return ",".join(f"{name}={spec.options[name]}" for name in self.varied) or spec.name
 
@@ -44,10 +49,22 @@ def unknowns(spec: ProblemSpec) -> int:
 
 
 def sizes(
-    specs: Sequence[ProblemSpec], first: int | None, growth: float, levels: int, count: Count = unknowns
+    specs: Sequence[ProblemSpec],
+    first: int | None,
+    growth: float,
+    levels: int,
+    count: Count = unknowns,
+    axis: str | None = None,
 ) -> Sizes:
-    """The grid as it is, or, of a single problem, `levels` of them, unknowns by `count`. Raises InputError."""
-    return grid(specs) if len(specs) > 1 else climb(specs[0], first, growth, levels, count)
+    """The grid as it is, or, of a single problem, `levels` of them over `axis`, n if it is not told, unknowns by
+    `count`. Raises InputError.
+    """
+    if len(specs) == 1:
+        return climb(specs[0], first, growth, levels, count, axis or "n")
+    found = grid(specs)
+    if axis is not None and found.varied != (axis,):
+        raise InputError(f"--axis {axis}: the grid is one over {' and '.join(found.varied)} - leave one of them out")
+    return found
 
 
 def grid(specs: Sequence[ProblemSpec]) -> Sizes:
@@ -65,35 +82,45 @@ def grid(specs: Sequence[ProblemSpec]) -> Sizes:
     return replace(of, specs=tuple(sorted(specs, key=of.magnitude)))
 
 
-def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int, count: Count) -> Sizes:
-    """n such that the unknowns grow by `growth` a level, from `first` or the n given. Raises InputError."""
-    if levels == 1 and first is None:
+def climb(spec: ProblemSpec, first: int | None, growth: float, levels: int, count: Count, axis: str = "n") -> Sizes:
+    """n, or another axis, such that the unknowns grow by `growth` a level, from `first` or the n given.
+
+    Raises InputError.
+    """
+    if levels == 1 and first is None and axis == "n":
         return Sizes((spec,), ("n",) if "n" in spec.options else ())
-    start = _start(spec, first)
-    per_n = _dimension(spec, start, count)
+    start = _start(spec, first, axis)
+    if levels == 1:
+        return Sizes((_sized(spec, axis, start),), (axis,))
+    per_n = _dimension(spec, axis, start, count)
     ns = [start]
     for level in range(1, levels):
         ns.append(max(ns[-1] + 1, round(start * growth ** (level / per_n))))
-    return Sizes(tuple(_sized(spec, n) for n in ns), ("n",))
+    return Sizes(tuple(_sized(spec, axis, n) for n in ns), (axis,))
 
 
-def _start(spec: ProblemSpec, first: int | None) -> int:
-    option = declared_by(spec.build).options.get("n")
+def _start(spec: ProblemSpec, first: int | None, axis: str) -> int:
+    option = declared_by(spec.build).options.get(axis)
     if option is None or int not in option.kinds:
-        raise InputError(f"{spec.name}: has no whole number n to climb by - give a grid: '{spec.name}[KEY=1|2|4]'")
-    start = spec.options["n"] if first is None else first
+        grid = f"'{spec.name}[KEY=1|2|4]'"
+        raise InputError(
+            f"{spec.name}: has no whole number {axis} to climb by - give a grid: {grid}, or another --axis"
+        )
+    start = spec.options[axis] if first is None else first
     if start is None or start < 1:
-        raise InputError(f"{spec.name}: n={start} is no size - say where to begin: --from N")
+        raise InputError(f"{spec.name}: {axis}={start} is no size - say where to begin: --from N")
     return int(start)
 
 
-def _sized(spec: ProblemSpec, n: int) -> ProblemSpec:
-    return replace(spec, options=spec.options | {"n": n})
+def _sized(spec: ProblemSpec, axis: str, n: int) -> ProblemSpec:
+    return replace(spec, options=spec.options | {axis: n})
 
 
-def _dimension(spec: ProblemSpec, n: int, count: Count) -> float:
+def _dimension(spec: ProblemSpec, axis: str, n: int, count: Count) -> float:
     """d of n_u ~ n^d, by what twice as much n gives."""
-    few, many = (count(_sized(spec, size)) for size in (n, 2 * n))
+    few, many = (count(_sized(spec, axis, size)) for size in (n, 2 * n))
     if few >= many:
-        raise InputError(f"{spec.name}: n={n} has {few} unknowns, n={2 * n} has {many} - give a grid of sizes")
+        raise InputError(
+            f"{spec.name}: {axis}={n} has {few} unknowns, {axis}={2 * n} has {many} - give a grid of sizes"
+        )
     return math.log2(many / few)

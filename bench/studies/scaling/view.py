@@ -15,6 +15,7 @@ from gradient_routes.bench.render.terminal import tables
 from gradient_routes.bench.render.terminal.palette import route_style
 from gradient_routes.bench.render.terminal.plot import Series, marks, plot
 from gradient_routes.bench.studies.scaling import break_even_view as break_even
+from gradient_routes.bench.studies.scaling import checkpoints_view
 from gradient_routes.bench.studies.scaling import growth_view as growth
 from gradient_routes.bench.studies.scaling.climbing import Series as Routes
 from gradient_routes.bench.studies.scaling.growing_error import growing
@@ -35,6 +36,12 @@ def show(out: Console, done: Scaling, plotted: bool = True) -> None:
     _section(out, f"{family(done)}: what a gradient costs", bills(done), BILLS)
     if done.growths:
         _section(out, "how it grows", growth.table(done), growth.legend(done))
+    if at_last := checkpoints_view.last(done.checkpoints):
+        _section(out, checkpoints_view.title(at_last), checkpoints_view.table(at_last), checkpoints_view.LEGEND)
+        out.print(checkpoints_view.least(at_last), soft_wrap=not out.is_terminal)
+        if plotted:
+            out.print(checkpoints_view.curve(at_last, out.width))
+        out.print()
     _section(out, "the largest size under the caps", reached(done))
     for series in done.series:
         for said in growing(done.sizes, series):
@@ -110,11 +117,11 @@ def plots(done: Scaling, width: int) -> RenderableType:
     against = "iterations"
     if by_size:
         rows = max((series.rows for series in every), key=len)
-        against = abscissas(rows)[0]
+        against = abscissas(done.sizes, rows)[0]
     time = _curves(every, against, "seconds")
     memory = _curves(every, against, "peak_bytes") if width >= WIDE else []
     title = f"{family(done)}: time [s]"
-    label = {"n_state": "n_u", "n_param": "n_p"}.get(against, against)
+    label = growth.symbols(done)[against] if against != "iterations" else against
     if all(len(curve.x) < 2 for curve in memory):
         return plot(time, label, title, width)
     each = (width - 4) // 2

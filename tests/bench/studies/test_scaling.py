@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from io import StringIO
 from pathlib import Path
 
@@ -23,13 +23,14 @@ from gradient_routes.bench.execution import timing
 from gradient_routes.bench.store.store import Store
 from gradient_routes.bench.studies.scaling import break_even_view as break_even
 from gradient_routes.bench.studies.scaling import race
+from gradient_routes.bench.studies.scaling.checkpoints import checkpoints, every_kind
 from gradient_routes.bench.studies.scaling.climbing import extrapolated
 from gradient_routes.bench.studies.scaling.crossing import cheaper, crossing, exact, line
 from gradient_routes.bench.studies.scaling.measure import Scaling, abscissas, scaling
 from gradient_routes.bench.studies.scaling.power_law import fit
 from gradient_routes.bench.studies.scaling.race import doublings
 from gradient_routes.bench.studies.scaling.sizes import Sizes, sizes
-from gradient_routes.routes.tally import Tally
+from gradient_routes.routes.tally import Tally, Work
 
 QUICK = Settings(min_time=0.0)
 QUICK_BUDGET = 0.3
@@ -331,11 +332,12 @@ def test_n_u_and_n_p_are_told_apart_where_they_can_be() -> None:
     def rows(*pairs):
         return [{"n_state": n_u, "n_param": n_p} for n_u, n_p in pairs]
 
-    assert abscissas(rows((8, 8), (16, 16))) == ("n_state",)
-    assert abscissas(rows((8, 4), (16, 8))) == ("n_state",)
-    assert abscissas(rows((8, 2), (16, 2))) == ("n_state",)
-    assert abscissas(rows((8, 2), (8, 4))) == ("n_param",)
-    assert abscissas(rows((54, 8), (144, 27))) == ("n_state", "n_param")
+    bar = sizes_of("bar")
+    assert abscissas(bar, rows((8, 8), (16, 16))) == ("n_state",)
+    assert abscissas(bar, rows((8, 4), (16, 8))) == ("n_state",)
+    assert abscissas(bar, rows((8, 2), (16, 2))) == ("n_state",)
+    assert abscissas(bar, rows((8, 2), (8, 4))) == ("n_param",)
+    assert abscissas(bar, rows((54, 8), (144, 27))) == ("n_state", "n_param")
 
 
 def test_the_command_prints_rows_and_keeps_them(cli) -> None:
@@ -383,7 +385,76 @@ def test_nothing_measured_is_exit_code_1(cli) -> None:
     assert "skipped: predicted bill" in ran.out
 
 
+def test_along_steps_the_least_memory_over_k_is_found() -> None:
+    """The fewest states are at k = 8 = sqrt(T); steps marched again by formula."""
+    asked = "vibrating-bar[n=2,steps=16|32|64]"
+    done = study(asked, *every_kind(sizes_of(asked)))
+    last = {row["route_options"]["checkpoint"]: row for row in done.checkpoints if row["steps"] == 64}
+    k = {name: row["interval"] for name, row in last.items()}
+    assert k == {"all": 64, "every=4": 4, "sqrt": 8, "revolve=10": None, "none": None}
+    again = {name: row["recomputed"] for name, row in last.items()}
+    assert again == {"all": 0, "every=4": 3 * 15, "sqrt": 7 * 7, "revolve=10": 2 * 64 - 12 - 64 + 1, "none": 63 * 31}
+    assert {row["interval"] for row in done.checkpoints if row["least"] and row["steps"] == 64} == {8}
+    laws = {(g.quantity, g.route_options["checkpoint"]): g for g in done.growths}
+    law = laws["recomputed", "every=4"]
+    assert (law.against, law.fit.law, law.fit.prefactor, law.fit.constant) == ("steps", "affine", 0.75, -3.0)
+
+
+def march(k: int, T: int, peak: float | None) -> dict:
+    """A row of a march of `T` steps, kept after every k."""
+    work = asdict(Work(forward_solves=1, steps=T))
+    of = {"problem": "bar", "problem_options": {"steps": T}, "route": "adjoint", "n_state": 4 * T, "peak_bytes": peak}
+    return empty_row() | of | {"route_options": {"checkpoint": f"every={k}"}, "status": "ok", "work": work}
+
+
+@pytest.mark.parametrize(
+    ("peaks", "least"),
+    [
+        ((9e6, 4e6, 3e6, 5e6), (40, "measured")),
+        ((9e6, 4e6, 1e6, 5e6), (40, "measured")),  # one is below the resolution, hence the least
+        ((9e6, 9e5, 8e5, 5e6), (10, "counted")),
+        ((9e6, 9e5, None, 5e6), (10, "counted")),
+        ((9e6, 4e6), None),
+    ],
+)
+def test_what_is_not_resolved_is_not_the_least(peaks: tuple, least: tuple | None) -> None:
+    rows = checkpoints([march(k, 100, peak) for k, peak in zip((2, 10, 40, 100), peaks, strict=False)])
+    assert [(row["interval"], row["least"]) for row in rows if row["least"]] == ([least] if least else [])
+    assert [row["states_kept"] for row in rows] == [49 + 3, 9 + 11, 2 + 40, 101][: len(peaks)]
+
+
+def test_the_screen_marks_the_least_memory(cli) -> None:
+    words = (
+        "--axis",
+        "steps",
+        "--from",
+        "16",
+        "--growth",
+        "2",
+        "--levels",
+        "2",
+        "--min-time",
+        "0",
+        "--no-store",
+        "--no-isolate",
+    )
+    ran = cli("scaling", "--problem", "vibrating-bar[n=2]", "--route", "adjoint[checkpoint=every=1|sqrt|all]", *words)
+    assert (ran.code, ran.err) == (0, "")
+    for said in (
+        "steps=32",
+        "vibrating-bar[n=2,steps=32]: what checkpoints keep and march again",
+        "adjoint: fewest states 11 at k = 6, sqrt(T) = 5.66; peaks below 1 MiB are not told apart",
+        "T = 32: memory [byte]",
+    ):
+        assert said in ran.out
+
+
 WRONG = {
+    "--problem bar --axis steps": "bar: has no whole number steps to climb by",
+    "--problem vibrating-bar --axis mesh": "vibrating-bar: has no whole number mesh to climb by",
+    "--problem vibrating-bar --axis dt": "vibrating-bar: has no whole number dt to climb by",
+    "--problem vibrating-bar[n=4|8] --axis steps": "--axis steps: the grid is one over n",
+    "--problem vibrating-bar --axis steps --route adjoint[checkpoint=sqrt|every=99]": "every=99 of 60 steps - choose 1",
     "--problem all": "name one problem",
     "--problem bar --growth 1": "--growth 1 - give a number > 1",
     "--problem bar --levels 0": "--levels 0 - give a whole number from 1",
