@@ -3,6 +3,7 @@
     python -m benchmarks.frameworks            measures what is missing in results/frameworks.sqlite, then writes both
     python -m benchmarks.frameworks --again    measures everything anew, in a quarter of an hour
     --timeout 400                              seconds for a case, on a machine that is busy
+    --marches                                  only marches in time; what else the table has is kept
 
 Gradients are judged by an adjoint that is polished until |R| stagnates: at n = 4 it agrees with complex steps to 1e-14.
 """
@@ -29,14 +30,14 @@ from gradient_routes.bench.cases.environment import environment
 from gradient_routes.bench.cases.row import measured
 from gradient_routes.bench.execution.references import norm2
 from gradient_routes.bench.store.store import Store
+from gradient_routes.bench.studies.options import one_problem
 from gradient_routes.bench.units import duration, size
-from gradient_routes.problems.bar import Bar
-from gradient_routes.problems.block import Block
 from gradient_routes.problems.problem import Array
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.foreign.foreign import PHASES
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.synthetic_data import with_synthetic_data
 
 STORE, PAGE, TABLE = (Path("results/frameworks").with_suffix(suffix) for suffix in (".sqlite", ".md", ".csv"))
 LIMIT_S = 120.0  # for a case: start, compilation, two gradients and their judgement
@@ -50,20 +51,25 @@ ON_BLOCK = (
     "jax-fem[tolerances=default|tight] torch-fem[solver=direct|cg] dolfinx[ranks=1]"
     " dolfinx-adjoint feax[tolerances=default|tight] warp"
 ).split()
+MARCH = "vibrating-bar[scheme={scheme},dt=0.002,steps=1000]"  # `benchmarks.march` has ten times as many steps
+MARCHED = {"central-difference": ["taichi-march", "warp-march"], "newmark": ["diffrax", "torch-march"]}
+LONG, KEPT = 200, ["adjoint[checkpoint=all|sqrt]"]
 RANKS = ["dolfinx[ranks=2]"]  # alone: ranks that wait keep a processor busy
 FAST = "adjoint adjoint[correct=yes] dolfinx dolfinx-adjoint".split()
 SLOW = "torch-fem[solver=direct] warp jax-fem[tolerances=tight] feax[tolerances=tight]".split()
 DIRECT = {4: FAST + SLOW, 16: FAST}
 DEFAULT, TIGHT = 1e-12, 1e-14  # rtol
 POLISHED = Solver(rtol=1e-14, adjoint_rtol=1e-15, polish=2)
-ABSENT = {"Taichi, explicit dynamics in the manner of DiffTaichi": "its adapter for vibrating-bar is not written yet"}
 COLUMNS = (
     "problem n route status reason name versions J error off_adjoint first_s compile_s forward_s backward_s peak_bytes"
     " tape_bytes memory_by rtol started"
 ).split()
+WHOLE = ("n", "peak_bytes", "tape_bytes")
+REAL = ("J", "error", "off_adjoint", "first_s", "compile_s", "forward_s", "backward_s", "rtol")
 KEY = ("problem", "n", "route", "rtol")
 NOT_MEASURED = {"status": "not measured", "reason": "run make adapters-all"}
-NAMED = ("strategy", "solver", "tolerances", "ranks", "correct")
+NAMED = ("strategy", "solver", "tolerances", "ranks", "correct", "checkpoint")
+LEFT_OUT = ("no", "whole")  # defaults
 BUSY = 1.5  # wall over CPU time of forward solves
 SECONDS = ("first_s", "compile_s", "forward_s", "backward_s")
 HEAD = ("route", "first call", "compile", "forward", "backward", "peak memory", "tape", "error", "off our adjoint")
@@ -71,6 +77,7 @@ HEAD = ("route", "first call", "compile", "forward", "backward", "peak memory", 
 
 def measure(timeout: float) -> None:
     """Cases that the store lacks. Other codes time themselves: see the column `peer`."""
+    measure_marches(timeout)
     for problem, sizes, peers in (("bar", BARS, (ON_BAR,)), ("block", BLOCKS, (ON_BLOCK, RANKS))):
         for selector in (f"{problem}[n={n}]" for n in sizes):
             _run(selector, OURS, timeout)
@@ -78,6 +85,19 @@ def measure(timeout: float) -> None:
                 _run(selector, routes, timeout, "--no-timing")
     for n, routes in DIRECT.items():
         _run(f"block[n={n}]", routes, timeout, "--rtol", str(TIGHT), "--no-timing")
+
+
+def measure_marches(timeout: float) -> None:
+    for scheme, peers in MARCHED.items():
+        selector = selected(MARCH.format(scheme=scheme), LONG)
+        _run(selector, KEPT, timeout)
+        _run(selector, peers, timeout, "--no-timing")
+
+
+def selected(problem: str, n: int) -> str:
+    """A problem of the table as it is asked for."""
+    name, _, options = problem.rstrip("]").partition("[")
+    return f"{name}[n={n}{options and ','}{options}]"
 
 
 def _run(problem: str, routes: Sequence[str], timeout: float, *options: str) -> None:
@@ -101,7 +121,7 @@ class References:
 @cache
 def references(problem: str, n: int) -> References:
     """Where gradients of a problem with n elements, or n^3, are compared with."""
-    built = Bar(n=n) if problem == "bar" else Block(n=n)
+    built = with_synthetic_data(one_problem(selected(problem, n))())
     p = built.parameters.start
     gradients = (adjoint.prepare(Model(built, solver), p)(p).gradient for solver in (POLISHED, Solver()))
     return References(*gradients)
@@ -114,7 +134,7 @@ def off(g: Array, reference: Array) -> float:
 
 def record(row: Row) -> dict[str, Any]:
     """What the table has of a row."""
-    n, peer = row["problem_options"]["n"], row["peer"] or {}
+    problem, n, peer = named(row), row["problem_options"]["n"], row["peer"] or {}
     told = {name: row[name] for name in ("status", "reason", "first_s", "peak_bytes", "tape_bytes", "started")}
     seconds = {name: peer.get(name) for name in PHASES}
     if row["seconds"] is not None:  # timed by us
@@ -124,7 +144,7 @@ def record(row: Row) -> dict[str, Any]:
     of_ours = {"gradient-routes": environment()["versions"]["gradient-routes"]} if row["route"] in OURS else {}
     versions = peer.get("versions") or of_ours
     found = {
-        "problem": row["problem"],
+        "problem": problem,
         "n": n,
         "route": label(row["route"], row["route_options"] or {}),
         "J": row["objective"],
@@ -134,21 +154,29 @@ def record(row: Row) -> dict[str, Any]:
     found |= {"versions": " ".join(f"{name} {of}" for name, of in versions.items()), "memory_by": row["memory_method"]}
     found |= {"name": peer.get("name", "gradient-routes"), "rtol": (row["settings"] or {}).get("rtol", DEFAULT)}
     if measured(row) and row["gradient"] is not None:
-        g, known = np.array(row["gradient"]), references(row["problem"], n)
+        g, known = np.array(row["gradient"]), references(problem, n)
         found |= {"error": off(g, known.polished), "off_adjoint": off(g, known.ours)}
     return found
 
 
+def named(row: Row) -> str:
+    """The problem of a row, a march with its scheme."""
+    options = row["problem_options"]
+    return MARCH.format(**options) if row["problem"] == "vibrating-bar" else str(row["problem"])
+
+
 def label(route: str, options: Mapping[str, Any]) -> str:
     """A route with those of its options that the comparison names."""
-    given = [f"{name}={options[name]}" for name in NAMED if options.get(name, "no") != "no"]
+    given = [f"{name}={options[name]}" for name in NAMED if options.get(name, "no") not in LEFT_OUT]
     return route + (f"[{','.join(given)}]" if given else "")
 
 
 def in_order(records: Sequence[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """As they are asked for, with a row for what has not been measured; then the others."""
     known = {tuple(each[name] for name in KEY): each for each in records}
-    for problem, sizes, routes in (("bar", BARS, OURS + ON_BAR), ("block", BLOCKS, OURS + ON_BLOCK + RANKS)):
+    marched = [(MARCH.format(scheme=scheme), (LONG,), KEPT + peers) for scheme, peers in MARCHED.items()]
+    steady = [("bar", BARS, OURS + ON_BAR), ("block", BLOCKS, OURS + ON_BLOCK + RANKS)]
+    for problem, sizes, routes in (*steady, *marched):
         for n, spec in product(sizes, case.routes(routes)):
             key = (problem, n, label(spec.name, spec.options), DEFAULT)
             yield known.pop(key, dict(zip(KEY, key, strict=True)) | NOT_MEASURED)
@@ -187,8 +215,6 @@ def page(records: Sequence[dict[str, Any]], busy: float) -> Iterator[str]:
     yield "## Versions\n"
     about = {each["name"]: each["versions"] for each in records if each.get("versions")}
     yield from table(("measured by", "versions"), sorted(about.items()))
-    yield "## Not measured\n"
-    yield from table(("what", "why"), ABSENT.items())
 
 
 def cells(each: dict[str, Any]) -> tuple[str, ...]:
@@ -210,10 +236,27 @@ def table(head: Sequence[str], rows: Any) -> Iterator[str]:
     yield ""
 
 
+def earlier() -> list[dict[str, Any]]:
+    """What the table has, for cases that the store lacks."""
+    if not TABLE.exists():
+        return []
+    with TABLE.open(newline="") as file:
+        rows = [{name: read(name, text) for name, text in row.items()} for row in csv.DictReader(file)]
+    return [row for row in rows if row["status"] != NOT_MEASURED["status"]]
+
+
+def read(name: str, text: str) -> Any:
+    """A cell of the table."""
+    if not text:
+        return None
+    return int(text) if name in WHOLE else float(text) if name in REAL else text
+
+
 def write() -> None:
     """The page and the table of what the store has."""
     rows = list(Store(STORE).latest().values())
-    records = [*in_order([*map(record, rows)])]
+    new = [*map(record, rows)]
+    records = [*in_order([*earlier(), *new])]
     prices = [row["price_s"] / row["price_cpu_s"] for row in rows if row["price_s"] and row["price_cpu_s"]]
     PAGE.write_text("\n".join(page(records, median(prices or [1.0]))))
     with TABLE.open("w", newline="") as file:
@@ -226,10 +269,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.frameworks")
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--timeout", type=float, default=LIMIT_S)
+    parser.add_argument("--marches", action="store_true")
     asked = parser.parse_args()
     if asked.again:
         STORE.unlink(missing_ok=True)
-    measure(asked.timeout)
+    (measure_marches if asked.marches else measure)(asked.timeout)
     write()
 
 

@@ -442,6 +442,8 @@ class Problem:
         bar           n, length [m], area [m^2], load [N], sensors (m,) nodes counted from 1, data (m,) [m]
         hyperelastic  points (n, 3) [m], cell_type and cells (n_e, k) in VTK's order, clamped nodes, forces (n, 3) [N]
                       dead nodal forces, sensors (m,) nodes, data (m, 3) [m], law, nu, modulus (n_e,) index in p
+        vibrating-bar the bar's, but no load: scheme, steps T, dt [s], density [kg/m^3], force (T + 1,) [N] at times 0
+                      to T dt, data (T, m)
         All: parametrization, log or raw: p is log E or E [Pa]; J = 1/2 |S u - d|^2. Nodes count from 0 where not said.
         """
         raise NotOffered(f"{self.name}: is not described to other codes")

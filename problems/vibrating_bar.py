@@ -128,7 +128,7 @@ class VibratingBar(Transient):
             self.stop, self.linear, self.constant = made, False, False
         self.n, self.steps, self.h, self.scheme = n, steps, dt, SCHEMES[scheme]
         self.n_state = 2 * n * steps
-        self.L_e, self.A, self.seed = length / n, area, seed
+        self.L_e, self.A, self.density, self.seed = length / n, area, density, seed
         self.mass = np.full(n, density * area * self.L_e)  # (N,) [kg]
         self.mass[-1] /= 2.0
         self.row = self.mass[0] / dt
@@ -390,6 +390,32 @@ class VibratingBar(Transient):
         other = copy.copy(self)
         other.readings = readings
         return other
+
+    def case(self) -> dict[str, Any]:
+        untold = {
+            "a stop": self.stop is not None,
+            f"alpha={self.alpha:g}": self.alpha != 0.0,
+            "damping": bool(self.unknowns.c),
+            f"unknown={','.join(self.unknowns.kinds)}": self.unknowns.kinds != ("moduli",),
+            "a file that lacks readings": self.readings.w is not None,
+        }
+        if any(untold.values()):
+            what = next(what for what in untold if untold[what])
+            raise NotOffered(f"vibrating-bar: {what} is not described to other codes - leave it out")
+        return {
+            "kind": "vibrating-bar",
+            "scheme": self.scheme.name,
+            "n": self.n,
+            "steps": self.steps,
+            "dt": self.h,
+            "length": self.L_e * self.n,
+            "area": self.A,
+            "density": self.density,
+            "force": self.F,
+            "sensors": self.readings.at + 1,
+            "data": self.readings.data,
+            "parametrization": "log" if self.unknowns.log else "raw",
+        }
 
     def view(self, p: Array, u: Array, lam: Array | None) -> ParameterView:
         shares = super().view(p, u, lam)

@@ -14,7 +14,8 @@ from gradient_routes.bench.sanitize import echo
 if TYPE_CHECKING:
     from gradient_routes.routes.foreign.manifest import Manifest
 
-CASES = {"bar": "bar", "hyperelastic": "block[n=2]"}  # by kind: a problem to hold a new environment against ours
+# by kind: a problem to hold a new environment against ours, with values that the adapter knows
+CASES = {"bar": "bar", "hyperelastic": "block[n=2]", "vibrating-bar": "vibrating-bar[scheme={scheme}]"}
 
 
 @click.group(invoke_without_command=True)
@@ -77,9 +78,10 @@ def _compared(route: str, adapter: Manifest) -> str:
     from gradient_routes.bench.execution.sweep import run
     from gradient_routes.problems.errors import RoutesError
 
-    problem = next((CASES[kind] for kind in CASES if kind in adapter.cases), None)
-    if problem is None:
+    kind = next((kind for kind in CASES if kind in adapter.cases), None)
+    if kind is None:
         return "not compared: it knows none of our problems"
+    problem = CASES[kind].format(**{name: values[0] for name, values in adapter.cases[kind].items()})
     (outcome,) = run(case.problems([problem]), case.routes([route]), Settings(timed=False))
     row = outcome.row
     if row["status"] != "ok":

@@ -16,6 +16,7 @@ SchemeName = Literal["newmark", "backward-euler", "central-difference"]
 class Scheme:
     """Weights a, b, c of velocities, forces and damping of the new step; explicit where none of its forces is used."""
 
+    name: SchemeName
     of_velocity: float
     of_force: float
     of_damping: float
@@ -40,7 +41,10 @@ class Scheme:
 # Newmark 1959 with beta = 1/4, gamma = 1/2, which is the trapezoidal rule; central differences of u (leapfrog) have
 # velocities half a step early
 SCHEMES: dict[SchemeName, Scheme] = {
-    "newmark": Scheme(0.5, 0.5, 0.5),
-    "backward-euler": Scheme(1.0, 1.0, 1.0),
-    "central-difference": Scheme(1.0, 0.0, 1.0),
+    scheme.name: scheme
+    for scheme in (
+        Scheme("newmark", 0.5, 0.5, 0.5),
+        Scheme("backward-euler", 1.0, 1.0, 1.0),
+        Scheme("central-difference", 1.0, 0.0, 1.0),
+    )
 }

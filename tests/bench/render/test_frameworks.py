@@ -19,12 +19,23 @@ ASKED = (
     *frameworks.FAST,
     *frameworks.SLOW,
     *frameworks.OURS,
+    *(route for routes in frameworks.MARCHED.values() for route in routes),
 )
 BROKEN = Path(__file__).parents[2] / "routes" / "foreign" / "misbehaving.py"
 
 
 def test_it_asks_for_every_adapter_with_options_that_it_has() -> None:
     assert {spec.name for spec in case.routes(ASKED)} == {*shipped(), *frameworks.OURS}
+
+
+def test_what_was_measured_before_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    committed = Path("results/frameworks.csv").read_text()
+    (tmp_path / "it.csv").write_text(committed)
+    for name, path in (("STORE", "no.sqlite"), ("PAGE", "it.md"), ("TABLE", "it.csv")):
+        monkeypatch.setattr(frameworks, name, tmp_path / path)
+    frameworks.write()
+    assert (tmp_path / "it.csv").read_text() == committed
+    assert (tmp_path / "it.md").read_text().count("\n|") == Path("results/frameworks.md").read_text().count("\n|")
 
 
 def test_a_row_is_numbers_or_the_reason_why_not(tmp_path: Path, cli, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -57,8 +57,35 @@ def linear_block(case: dict[str, Any], p: Array) -> float:
 
 BLOCKS = ["size=1,2,1.5", "parametrization=raw,clamped=left,loaded=right,sensors=top", "data=twin,noise=1e-3"]
 BLOCKS += ["unknown=layers,layers=2,nu=0.1"]
+
+
+def vibrating_bar(case: dict[str, Any], p: Array) -> float:
+    """Stepped by dense matrices: A z_t + B z_{t-1} = h f, z = (u, v)."""
+    n, h, L_e = case["n"], case["dt"], case["length"] / case["n"]
+    stretch, m = np.eye(n) - np.eye(n, k=-1), np.full(n, case["density"] * case["area"] * L_e)
+    m[-1] /= 2
+    K = stretch.T @ np.diag(modulus(case, p) * case["area"] / L_e) @ stretch
+    I, M, (a, b) = np.eye(n), np.diag(m), WEIGHTS[case["scheme"]]
+    A, B = np.block([[I, -a * h * I], [b * h * K, M]]), np.block([[I, (1 - a) * h * I], [(b - 1) * h * K, M]])
+    z, J, F = np.zeros(2 * n), 0.0, case["force"]
+    for t in range(1, case["steps"] + 1):
+        f = np.zeros(2 * n)
+        f[-1] = h * (b * F[t] + (1 - b) * F[t - 1])
+        z = np.linalg.solve(A, B @ z + f)
+        J += 0.5 * ((z[case["sensors"] - 1] - case["data"][t - 1]) ** 2).sum()
+    return float(J)
+
+
+WEIGHTS = {
+    "newmark": (0.5, 0.5),
+    "backward-euler": (1.0, 1.0),
+    "central-difference": (1.0, 0.0),
+}  # of the new v and force
 CASES = {f"bar[n=7,sensors=2..5,parametrization={of}]": bar for of in ("log", "raw")}
 CASES |= {f"block[nx=2,ny=1,nz=3,law=linear,{options}]": linear_block for options in BLOCKS}
+
+BARS = [f"scheme={scheme},parametrization={of}" for scheme, of in zip(WEIGHTS, ("log", "raw", "log"), strict=True)]
+CASES |= {f"vibrating-bar[n=4,steps=9,dt=0.1,length=2,area=3,density=0.7,{options}]": vibrating_bar for options in BARS}
 
 
 def made(selector: str) -> Problem:
@@ -93,6 +120,10 @@ def test_the_law_and_its_constants_are_told() -> None:
     [
         ("bar[stop=penalty]", "a stop"),
         ("bar[alpha=0.1]", "alpha=0.1"),
+        ("vibrating-bar[stop=penalty]", "a stop"),
+        ("vibrating-bar[alpha=0.1]", "alpha=0.1"),
+        ("vibrating-bar[damping=skew]", "damping"),
+        ("vibrating-bar[unknown=moduli,velocity]", "unknown=moduli,velocity"),
         ("block[n=1,load=follower]", "load=follower"),
         ("block[n=1,cases=2]", "cases=2"),
         ("block[n=1,unknown=constants]", "unknown=constants"),

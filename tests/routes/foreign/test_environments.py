@@ -140,7 +140,7 @@ def test_those_that_are_made_may_be_left_alone(cli, monkeypatch: pytest.MonkeyPa
     assert cli(*"environments create --missing jax torch".split()).err == "routes: torch: no network\n"
     assert cli(*"environments create --missing all".split()).code == 1
     assert cli(*"environments create jax".split()).code == 1
-    assert made == ["torch", "dolfinx", "jax"]
+    assert made == ["torch", "diffrax", "jax"]
 
 
 def test_a_failed_environment_is_not_ready(monkeypatch: pytest.MonkeyPatch, cli) -> None:

@@ -13,16 +13,24 @@ from gradient_routes.bench.cases.registry import entries
 from gradient_routes.problems.bar import Bar
 from gradient_routes.problems.block import Block
 from gradient_routes.problems.errors import NotConverged
+from gradient_routes.problems.vibrating_bar import VibratingBar
 from gradient_routes.routes.adjoint import adjoint
+from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.foreign.foreign import of_manifest
 from gradient_routes.routes.foreign.manifest import Manifest, manifest, shipped
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
+from gradient_routes.routes.synthetic_data import with_synthetic_data
 
 MANIFESTS = {name: manifest(script) for name, script in shipped().items()}
-PROBLEMS = {"bar": lambda **options: Bar(n=8, **options), "hyperelastic": lambda **options: Block(n=2, **options)}
+PROBLEMS = {
+    "bar": lambda **options: Bar(n=8, **options),
+    "hyperelastic": lambda **options: Block(n=2, **options),
+    "vibrating-bar": lambda **options: with_synthetic_data(VibratingBar(**options)),  # N = 8, T = 60
+}
 # to rounding: Newton's last step may end just below a looser tolerance or many digits below it
 TIGHT = {"bar": Solver(rtol=1e-13, adjoint_rtol=1e-13), "hyperelastic": Solver(rtol=1e-14, adjoint_rtol=1e-13)}
+TIGHT["vibrating-bar"] = Solver()
 # the others: 1e-12, the tolerance times a condition number; the gradient of an iterate lags behind it by k rho^k
 ACCURACY = {"warp-unrolled": 1e-10, "taichi": 1e-10}
 RANKS = 2  # of MPI: more than that on few processors wait for each other
@@ -49,9 +57,11 @@ def skip_without_environment(found: Manifest) -> None:
 @pytest.mark.parametrize(("found", "kind", "parametrization", "options"), list(cases()))
 def test_the_gradient_is_ours(found: Manifest, kind: str, parametrization: str, options: dict[str, str]) -> None:
     skip_without_environment(found)
-    problem, solver = PROBLEMS[kind](parametrization=parametrization), TIGHT[kind]
+    known = {name: values[0] for name, values in found.cases[kind].items() if name == "scheme"}
+    problem, solver = PROBLEMS[kind](parametrization=parametrization, **known), TIGHT[kind]
     p = somewhere(problem)
-    J, expected, *_ = adjoint.prepare(Model(problem, solver), p)(p)
+    reference = complex_step if kind == "vibrating-bar" else adjoint
+    J, expected, *_ = reference.prepare(Model(problem, solver), p)(p)
     result = of_manifest(found).prepare(Model(problem, solver), p, **options)(p)
     tolerance = DEFAULTS if options.get("tolerances") == "default" else ACCURACY.get(found.name, 1e-12)
     assert result.J == pytest.approx(J, rel=tolerance)
