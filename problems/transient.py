@@ -24,7 +24,7 @@ from gradient_routes.problems.problem import (
 from gradient_routes.problems.rates import Rates, Stacked
 from gradient_routes.problems.step import Step
 
-CACHED = 2048  # numbers of an array of states that stay in a cache with a dozen others like it
+CACHED = 16384  # numbers of an array of states that stay in a cache with a dozen others like it
 
 
 class Transient(Problem):

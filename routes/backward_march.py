@@ -28,6 +28,9 @@ Checkpoint = Annotated[
 ]
 
 
+SHARE = 40  # states that are kept for one that is evaluated together with others: these take a third of the memory
+
+
 class Derivatives(Protocol):
     """Of the steps of a march: a `Transient`, or `TracedSteps`."""
 
@@ -41,11 +44,13 @@ def march_back(model: Model, p: Array, checkpoint: str, derivatives: Derivatives
 
     derivatives of the steps: those of the problem, where none are given
     """
-    march = March(model, p)
-    problem = march.problem
+    problem = model.problem
+    assert isinstance(problem, Transient)
     of, schedule = derivatives or problem, Schedule.of(checkpoint, problem.steps, problem.name)
+    together = max(1, min(problem.together, schedule.kept(problem.steps) // SHARE))
+    march = March(model, p, together)
     J, gradient, mu, left = problem.phi(p), of.phi_by(p), np.zeros_like(march.u_0), 0.0
-    for t_0, states in schedule.backwards(march, march.u_0, problem.steps, problem.together):
+    for t_0, states in schedule.backwards(march, march.u_0, problem.steps, together):
         rates = of.rates(t_0, states, p)
         lam, mu = march.back(t_0, states, -rates.J_u, mu)
         by_p = rates.J_p + rates.by_p(lam)

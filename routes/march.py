@@ -32,17 +32,17 @@ def most_newton_steps(model: Model, p: Array) -> int:
 
 
 class March:
-    """(t_0, t_1, u_{t_0}) -> u_{t_0}..u_{t_1}, (t_1 - t_0 + 1, n), and `back`.
+    """(t_0, t_1, u_{t_0}) -> u_{t_0}..u_{t_1}, (t_1 - t_0 + 1, n), and `back`; `together` steps at once.
 
     One factorization where the matrix is constant; else Newton's method in every step, and factors at the states
     themselves on the way back.
     """
 
-    def __init__(self, model: Model, p: Array) -> None:
+    def __init__(self, model: Model, p: Array, together: int) -> None:
         assert isinstance(model.problem, Transient)
-        self.model, self.problem, self.p = model, model.problem, p
+        self.model, self.problem, self.p, self.together = model, model.problem, p, together
         self.u_0 = self.problem.initial_state(p)
-        self.scale = model.march_scale(p)
+        self.scale = model.march_scale(p, together)
         model.tally.count("forward_solves")
         self.factors: RecurrenceFactorization | None = None
         self._factorize = Factorizer(model.solver.linear_solver, model.solver.rtol)
@@ -72,7 +72,7 @@ class March:
             for t in range(t_0 + 1, t_1 + 1):
                 states[t - t_0], _ = self.model.march_step(t, states[t - t_0 - 1], self.p, self.scale)
             return states
-        k = self.problem.together
+        k = self.together
         for begin in range(0, t_1 - t_0, k):
             b = self.problem.loads(t_0 + begin, min(k, t_1 - t_0 - begin), self.p)
             states[begin + 1 : begin + len(b) + 1] = self.factors.march(b, states[begin], t_0 + begin)

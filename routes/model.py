@@ -180,11 +180,13 @@ class Model:
         factors = Deferred(problem.tangent(U, p).norm, lambda: self.factorize(self.tangent(U, p)))
         return State(p, U, self.objective(U, p), (left,), scale, factors, self.tally.work - before)
 
-    def march_scale(self, p: Array) -> float:
-        """|R|_inf of a march that stays at u_0, to which tolerances of its steps are relative: one residual."""
+    def march_scale(self, p: Array, together: int | None = None) -> float:
+        """|R|_inf of a march that stays at u_0, to which tolerances of its steps are relative: one residual, of
+        `together` steps at once [those of the problem].
+        """
         assert isinstance(self.problem, Transient)
         self.tally.count("residuals")
-        rest, steps, k = self.problem.initial_state(p), self.problem.steps, self.problem.together
+        rest, steps, k = self.problem.initial_state(p), self.problem.steps, together or self.problem.together
         states = np.tile(rest, (min(k, steps) + 1, 1))
         return max(norm(self.problem.rows(t, states[: steps - t + 1], p)) for t in range(0, steps, k))
 

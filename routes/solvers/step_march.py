@@ -47,6 +47,7 @@ class StepMarch:
         self.by_v = stored(B.D.plus(-B.b / A.a, A.K))
         real = not any(np.iscomplexobj(part) for part in (self.by_u, self.by_v, *lu))
         self._compiled = compiled() if real and steps * A.K.main.size >= WORTH else None
+        self._factors = () if self._compiled is None else self._compiled.factors(lu)
         self._weights = tuple(float(np.real(x)) for x in (A.a, A.b, B.a, B.b))
         self.K, self.K_T = stored(A.K), stored(A.K.T)
         self.K_before_T, self.D_before_T = stored(B.K.T), stored(B.D.T)
@@ -62,7 +63,7 @@ class StepMarch:
         dtype = np.result_type(self.by_u, b, z)
         if self._compiled is not None and dtype == np.float64:
             rows = b.astype(dtype)
-            given = self.K, self.by_u, self.by_v, *self._compiled.factors(self.lu), *self._weights
+            given = self.K, self.by_u, self.by_v, *self._factors, *self._weights
             self._compiled.forward(rows, *given, z[:N].astype(dtype), z[N:].astype(dtype))
             return rows
         rows = np.empty(b.shape, dtype)
@@ -83,7 +84,7 @@ class StepMarch:
         rows = np.array(b, dtype=np.result_type(self.by_u, b, mu))
         by_u, by_v = mu[:N].astype(rows.dtype), mu[N:].astype(rows.dtype)
         if self._compiled is not None and rows.dtype == np.float64:
-            given = self.K_T, self.K_before_T, self.D_before_T, *self._compiled.factors(self.lu), *self._weights
+            given = self.K_T, self.K_before_T, self.D_before_T, *self._factors, *self._weights
             self._compiled.backward(rows, *given, by_u, by_v)
             return rows, np.concatenate([by_u, by_v])
         for t in range(len(b))[::-1]:
