@@ -183,6 +183,19 @@ def kink(problem: str, n: int, rng: np.random.Generator) -> Tables:
     return {"kink": rows}
 
 
+def horizon(problem: str, n: int, rng: np.random.Generator) -> Tables:
+    what = on(problem, n) | {"spread": 1e-3, "places": 12}
+    rows = []
+    for T in 2 ** np.arange(10):
+        scatter = 1e-4 * float(np.exp(T / 40.0))
+        slopes = {"slope": 1.0, "slope_mean": 1.0 + scatter * rng.standard_normal(), "slope_scatter": scatter}
+        found = {"objective": 1.0, "gradient_norm": 1.0 + scatter, "quotient": 1.0, "flips": int(T // 100)}
+        rows.append(
+            what | {"steps": int(T), "status": "ok", "verdict": "noisy" if scatter > 0.3 else "smooth"} | slopes | found
+        )
+    return {"horizon": rows}
+
+
 def inversion(problem: str, n: int, rng: np.random.Generator) -> Tables:
     histories, found, constants, fits, missed = [], [], [], [], []
     for route, optimizer, rate in (
@@ -329,6 +342,7 @@ MAKERS: tuple[Maker, ...] = (
     tolerance,
     unrolling,
     kink,
+    horizon,
     inversion,
     regularization,
     consistency,

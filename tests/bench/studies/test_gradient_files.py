@@ -23,7 +23,7 @@ from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver, State
 
-RUN = "run --min-time 0 --problem".split()
+RUN = "run --no-timing --problem".split()
 
 
 def test_gradients_are_written_parameter_by_parameter(cli) -> None:
