@@ -32,17 +32,20 @@ def most_newton_steps(model: Model, p: Array) -> int:
 
 
 class March:
-    """(t_0, t_1, u_{t_0}) -> u_{t_0}..u_{t_1}, (t_1 - t_0 + 1, n), and `back`; `together` steps at once.
+    """(t_0, t_1, u_{t_0}) -> u_{t_0}..u_{t_1}, (t_1 - t_0 + 1, n), and `back`.
+
+    together  steps that are evaluated at once [those of the problem]
 
     One factorization where the matrix is constant; else Newton's method in every step, and factors at the states
     themselves on the way back.
     """
 
-    def __init__(self, model: Model, p: Array, together: int) -> None:
+    def __init__(self, model: Model, p: Array, together: int | None = None) -> None:
         assert isinstance(model.problem, Transient)
-        self.model, self.problem, self.p, self.together = model, model.problem, p, together
+        self.model, self.problem, self.p = model, model.problem, p
+        self.together = together or self.problem.together
         self.u_0 = self.problem.initial_state(p)
-        self.scale = model.march_scale(p, together)
+        self.scale = model.march_scale(p, self.together)
         model.tally.count("forward_solves")
         self.factors: RecurrenceFactorization | None = None
         self._factorize = Factorizer(model.solver.linear_solver, model.solver.rtol)
