@@ -7,6 +7,7 @@ run, vcurve                 routes on problems: cost and error; one route under 
 invert, identify            minimize J by a route; what the data can say of p
 Store                       what is kept
 Problem, Parameters ...     to write a problem: R(u, p), J(u, p) and their partial derivatives
+Transient                   to write one that marches in time, by its step
 Route, route ...            to write a route: from p to (J, dJ/dp)
 Study, Table, Column ...    to write a study: a question, its options, what it keeps and shows
 RoutesError ...             what is raised on purpose, one line each
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from gradient_routes.problems.problem import Parameters as Parameters
     from gradient_routes.problems.problem import Problem as Problem
     from gradient_routes.problems.problem import Traced as Traced
+    from gradient_routes.problems.transient import Transient as Transient
     from gradient_routes.routes.forward_work import ForwardWork as ForwardWork
     from gradient_routes.routes.model import Model as Model
     from gradient_routes.routes.route import Result as Result
@@ -104,6 +106,7 @@ PUBLIC = {  # name -> the module that defines it, imported when the name is firs
     "Study": "gradient_routes.bench.cases.study",
     "Table": "gradient_routes.bench.cases.column",
     "Traced": "gradient_routes.problems.problem",
+    "Transient": "gradient_routes.problems.transient",
     "Work": "gradient_routes.routes.tally",
     "assert_gradient": "gradient_routes.bench.verification.api",
     "at_option": "gradient_routes.bench.command_options",

@@ -6,8 +6,7 @@ D, r and the height of the front at first are sought from one sensor: a transien
 import numpy as np
 from scipy import sparse
 
-from gradient_routes.problems.problem import Linearization, Offers, Parameters
-from gradient_routes.problems.transient import Transient
+from gradient_routes import Linearization, Offers, Parameters, Transient
 
 
 class Front(Transient):
