@@ -42,21 +42,22 @@ class Derivatives(Protocol):
 def march_back(model: Model, p: Array, checkpoint: str, derivatives: Derivatives | None = None) -> Result:
     """J and dJ/dp, counted as sweeps over all steps, Newton steps of a nonlinear march, and steps.
 
-    derivatives of the steps: those of the problem, where none are given
+    derivatives of the steps: those of the problem, where none are given. Raises NotConverged, Overflow.
     """
     problem = model.problem
     assert isinstance(problem, Transient)
     of, schedule = derivatives or problem, Schedule.of(checkpoint, problem.steps, problem.name)
     together = max(1, min(problem.together, schedule.kept(problem.steps) // SHARE))
     march = March(model, p, together)
-    J, gradient, mu, left = problem.phi(p), of.phi_by(p), np.zeros_like(march.u_0), 0.0
+    J, gradient, mu, left, size = problem.phi(p), of.phi_by(p), np.zeros_like(march.u_0), 0.0, 0.0
     for t_0, states in schedule.backwards(march, march.u_0, problem.steps, together):
         rates = of.rates(t_0, states, p)
         lam, mu = march.back(t_0, states, -rates.J_u, mu)
         by_p = rates.J_p + rates.by_p(lam)
         for J_t, g_t in zip(rates.J[::-1], by_p[::-1], strict=True):  # one by one, whatever steps come together
             J, gradient = J + J_t, gradient + g_t
-        left = max(left, norm(problem.rows(t_0, states, p)))
+        left, size = max(left, norm(problem.rows(t_0, states, p))), max(size, norm(states))
+    march.check(left, size)
     initial = of.pulled_to_initial(mu, p)
     model.tally.count("transposed_solves")
     model.tally.count("residuals")

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from gradient_routes.problems.errors import NotConverged
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.problem import Array
 from gradient_routes.problems.transient import Transient, stepwise
 from gradient_routes.routes.model import Model
+from gradient_routes.routes.newton import rounding
 from gradient_routes.routes.solvers.factorization import Factorizer
 from gradient_routes.routes.solvers.recurrence import RecurrenceFactorization
 
@@ -86,3 +88,18 @@ class March:
         if self.factors is not None:
             return self.factors.march_back(b, mu, t_0)
         return self._factorized(self._matrix(t_0, states)).march_back(b, mu, t_0)
+
+    def check(self, left: float, size: float) -> None:
+        """Raises NotConverged where |R|_inf = left, of states with |u|_inf = size, is neither within the tolerance nor
+        rounding: Newton's method checks its steps itself, one factorization for all is not checked otherwise.
+        """
+        if self.factors is None:
+            return
+        solver, problem = self.model.solver, self.problem
+        if not left <= max(solver.rtol * self.scale, rounding(np.array([size]), self.factors.norm, problem.offset)):
+            relative = left / (self.scale or 1.0)
+            raise NotConverged(
+                f"{problem.name}: |R| / |R_0| = {relative:.2g} after the march, wanted {solver.rtol:g}: R_u or R_v is"
+                " not the same in all steps (then set constant=False), or R_u is too ill-conditioned",
+                (self.scale, left),
+            )

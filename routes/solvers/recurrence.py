@@ -38,12 +38,14 @@ class RecurrenceFactorization(Factorization):
     def march(self, b: Array, z: Array, first: int = 0) -> Array:
         """z_t (k, n) of A_t z_t = b_t - B_t z_{t-1}, from z (n,) before them. Raises Overflow."""
         with np.errstate(over="ignore", invalid="ignore"):
-            if self._steps is not None:
+            if self._steps is not None and self._steps.takes(b, z):
                 rows = self._steps.forward(b, z)
             else:
-                rows = np.empty(b.shape, np.result_type(b, z))
+                each = []
                 for t in range(len(b)):
-                    rows[t] = z = self._block(t).substitute(b[t] - self._matrix.below(t) @ z, transposed=False)
+                    z = self._block(t).substitute(b[t] - self._matrix.below(t) @ z, transposed=False)
+                    each.append(z)
+                rows = np.stack(each)  # of their type: matrices may be complex where b is real
         self._check(rows, first, "state")
         return rows
 
@@ -52,13 +54,14 @@ class RecurrenceFactorization(Factorization):
         mu is to the steps before. Raises Overflow.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            if self._steps is not None:
+            if self._steps is not None and self._steps.takes(b, mu):
                 rows, mu = self._steps.backward(b, mu)
             else:
-                rows = np.empty(b.shape, np.result_type(b, mu))
+                each = []
                 for t in range(len(b))[::-1]:
-                    rows[t] = self._block(t).substitute(b[t] - mu, transposed=True)
-                    mu = self._matrix.below(t).T @ rows[t]
+                    each.append(self._block(t).substitute(b[t] - mu, transposed=True))
+                    mu = self._matrix.below(t).T @ each[-1]
+                rows = np.stack(each[::-1])
         self._check(rows, first, "adjoint state")
         return rows, mu
 

@@ -62,5 +62,7 @@ class BandedFactorization(Factorization):
         return sum(int(part.nbytes) for part in self.lu)
 
     def substitute(self, b: Array, transposed: bool) -> Array:
+        if np.iscomplexobj(b) and not np.iscomplexobj(self.lu[1]):  # R_u need not depend on p
+            return self.substitute(b.real, transposed) + 1j * self.substitute(b.imag, transposed)
         x, _ = self._solve(*self.lu, b, trans="T" if transposed else "N")
         return np.asarray(x)

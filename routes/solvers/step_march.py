@@ -45,8 +45,8 @@ class StepMarch:
         self._gttrs, self._gbmv = gttrs[0], gbmv[0]
         self.by_u = stored(B.K.plus(-B.a / A.a, A.K))
         self.by_v = stored(B.D.plus(-B.b / A.a, A.K))
-        real = not any(np.iscomplexobj(part) for part in (self.by_u, self.by_v, *lu))
-        self._compiled = compiled() if real and steps * A.K.main.size >= WORTH else None
+        self._real = not any(np.iscomplexobj(part) for part in (self.by_u, self.by_v, *lu))
+        self._compiled = compiled() if self._real and steps * A.K.main.size >= WORTH else None
         self._factors = () if self._compiled is None else self._compiled.factors(lu)
         self._weights = tuple(float(np.real(x)) for x in (A.a, A.b, B.a, B.b))
         self.K, self.K_T = stored(A.K), stored(A.K.T)
@@ -56,6 +56,10 @@ class StepMarch:
         """y + factor M x, in place of y."""
         N = len(x)
         return np.asarray(self._gbmv(N, N, 1, 1, factor, M, x, beta=1.0, y=y, overwrite_y=True))
+
+    def takes(self, *vectors: Array) -> bool:
+        """Whether these can be marched with: real factors drop imaginary parts."""
+        return not (self._real and any(map(np.iscomplexobj, vectors)))
 
     def forward(self, b: Array, z: Array) -> Array:
         """z_t (k, 2 N), from z (2 N,) before them."""

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from conftest import ROUTES, relative_error
 
-from gradient_routes.problems.errors import Overflow
+from gradient_routes.problems.errors import NotConverged, Overflow
 from gradient_routes.problems.problem import Linearization, Offers, Parameters
 from gradient_routes.problems.transient import Transient
+from gradient_routes.problems.vibrating_bar import VibratingBar
 from gradient_routes.routes.adjoint import adjoint
 from gradient_routes.routes.complex_step import complex_step
 from gradient_routes.routes.implicit_ad import implicit_ad
@@ -72,6 +73,47 @@ def test_unrolled_steps_give_the_gradient_of_their_iterates(front: Any, iteratio
     few = unrolled_ad.prepare(Model(front), p, iterations=iterations, checkpoint=2)(p)
     np.testing.assert_array_equal(few.gradient, kept.gradient)
     assert few.tape < kept.tape
+
+
+def test_a_march_whose_matrix_is_not_the_same_is_not_called_solved(front: Any) -> None:
+    class Wrong(type(front)):  # type: ignore[misc]
+        linear = constant = True
+
+    wrong = Wrong(n=9, steps=6)
+    for checkpoint in ("all", "sqrt", "revolve=2"):
+        with pytest.raises(NotConverged, match=r"front: .*R\| / \|R_0\| ="):
+            adjoint.prepare(Model(wrong), wrong.parameters.start, checkpoint=checkpoint)(wrong.parameters.start)
+
+
+class Turned(Transient):
+    """i u_t = p u_{t-1} + 1: a matrix that is complex where loads are real."""
+
+    name = "turned"
+    offers = Offers.LINEARIZE
+    linear = constant = True
+    parameters = Parameters(start=np.array([0.5]), scale=np.array([1.0]))
+    steps = n_state = 3
+
+    def step_residual(self, t: Any, u: Any, v: Any, p: Any, xp: Any = np) -> Any:
+        return 1j * u - p[0] * v - 1.0
+
+    def step_tangent(self, t: int, u: Any, v: Any, p: Any) -> Any:
+        return 1j * np.eye(1)
+
+    def step_coupling(self, t: int, u: Any, v: Any, p: Any) -> Any:
+        return -p[0] * np.eye(1)
+
+
+def test_imaginary_parts_of_matrices_and_loads_are_kept() -> None:
+    p = Turned.parameters.start
+    factors = Model(Turned()).factorize(Turned().tangent(np.zeros(3), p))
+    z = factors.solve(np.ones(3))
+    np.testing.assert_allclose(1j * z - 0.5 * np.append(0.0, z[:-1]), np.ones(3), atol=1e-15)
+    bar = VibratingBar(n=5, steps=4)
+    factors = Model(bar).factorize(bar.tangent(bar.initial(bar.parameters.start), bar.parameters.start))
+    b = np.linspace(-1.0, 1.0, bar.n_state) + 1j * np.linspace(2.0, 1.0, bar.n_state)
+    for solve in (factors.solve, factors.solve_transposed):
+        np.testing.assert_allclose(solve(b), solve(b.real) + 1j * solve(b.imag), rtol=1e-12)
 
 
 class Growth(Transient):
