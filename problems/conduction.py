@@ -219,6 +219,9 @@ class Heat(FirstOrder):
         ratios = [float(np.mean(c.value(p))) / other.sizes[c.name] for c in each]
         return other, max(max(r, 1.0 / r) if r > 0.0 else math.inf for r in ratios)
 
+    def halved(self) -> Heat | None:
+        return type(self)(**self._given | {"steps": 2 * self.steps, "dt": self.h / 2.0}) if self.measured else None
+
     def truth(self) -> Array | None:
         return None if self.measured else self.unknowns.truth
 

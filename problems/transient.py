@@ -210,6 +210,10 @@ class Transient(Problem):
         """By which part the largest energy exceeds that at the end of the load; None where there is none to tell."""
         return None
 
+    def halved(self) -> Transient | None:
+        """The same march to the same data in steps half as long; None where it cannot be made."""
+        return None
+
     def active_set(self, u: Array, p: Array) -> ActiveSteps | None:
         sets = [self.step_active_set(t, u_t, p) for t, u_t in enumerate(u.reshape(self.steps, -1), start=1)]
         return None if sets[0] is None else ActiveSteps(sets)

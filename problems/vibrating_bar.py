@@ -126,14 +126,12 @@ class VibratingBar(Transient):
             made = replace(made, law=BothSides(made.law, gap))
         if made is not None:
             self.stop, self.linear, self.constant = made, False, False
-        self.n, self.steps, self.h, self.scheme = n, steps, dt, SCHEMES[scheme]
-        self.n_state = 2 * n * steps
+        self.n, self.scheme = n, SCHEMES[scheme]
         self.L_e, self.A, self.density, self.seed = length / n, area, density, seed
         self.mass = np.full(n, density * area * self.L_e)  # (N,) [kg]
         self.mass[-1] /= 2.0
-        self.row = self.mass[0] / dt
-        t = np.arange(steps + 1) * dt
-        self.F = force * np.where(t < pulse, np.sin(np.pi * t / pulse) ** 2, 0.0)  # (T + 1,) [N]
+        self.force, self.pulse = force, pulse
+        self._set_steps(steps, dt)
         if not self.F.any():
             raise InputError(
                 f"vibrating-bar: force={force:g},pulse={pulse:g} acts at none of {steps} steps of dt={dt:g} and moves"
@@ -155,10 +153,20 @@ class VibratingBar(Transient):
         else:
             self.readings, self.read_as = read_histories_of_nodes(data, read, n, columns, units)
         self.measured = data is not None
-        self._kept: tuple[Array, tuple[StepMatrix, StepMatrix]] | None = None
         self.regularization = Prior(alpha)
         self.regularization.check(self.name)
         self._check_stable(self.stiffness(self.parameters.start))
+
+    def _set_steps(self, steps: int, h: float) -> None:
+        self.steps, self.h, self.n_state, self.row = steps, h, 2 * self.n * steps, self.mass[0] / h
+        t = np.arange(steps + 1) * h
+        self.F = self.force * np.where(t < self.pulse, np.sin(np.pi * t / self.pulse) ** 2, 0.0)  # (T + 1,) [N]
+        self._kept: tuple[Array, tuple[StepMatrix, StepMatrix]] | None = None
+
+    def halved(self) -> VibratingBar:
+        other = self._with(self.readings.halved())
+        other._set_steps(2 * self.steps, self.h / 2.0)
+        return other
 
     # --- the equations
 

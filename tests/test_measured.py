@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import runpy
 from pathlib import Path
 from typing import Any
@@ -61,3 +62,18 @@ def test_histories_of_a_wall_find_its_diffusivity_and_film_coefficient(tmp_path:
     truth = made("heated_wall")
     for row, value in zip(csv.DictReader(path.read_text().splitlines()), (truth["a"], truth["h"]), strict=True):
         assert abs(float(row["estimate"]) - np.log(value)) < 3.5 * float(row["sd"])
+
+
+def test_steps_that_are_too_long_are_told_by_where_the_answer_would_go(tmp_path: Path, cli) -> None:
+    """By what really changes when they are halved, within the second order of the change; with small residuals."""
+    options, found, said = ["--optimizer", "gauss-newton", "--no-plot", "--no-store"], [], []
+    for steps in (61, 122):
+        path = tmp_path / f"{steps}.csv"
+        march = f"steps={steps},dt={305 / steps}min"
+        ended = cli("invert", "--problem", f"heat[{WALL},{march}]", *options, "-o", str(path))
+        assert (ended.code, "misfit exceeds noise" in ended.out) == (1, False)
+        found.append(np.array([float(row["estimate"]) for row in csv.DictReader(path.read_text().splitlines())]))
+        said.append(re.search(r"steps in time are too long: half as long, they move (.*) - take more", ended.out))
+    moves = dict(re.findall(r"log (\w) by ([-+.\de]+)", said[0][1]))
+    told = np.array([float(moves["a"]), float(moves["h"])])
+    np.testing.assert_allclose(told, found[1] - found[0], rtol=0.15)

@@ -15,6 +15,7 @@ from gradient_routes.bench.inversion import posterior
 from gradient_routes.bench.inversion.constants import Constants, Spread, stated
 from gradient_routes.bench.inversion.objective import Evaluation, observed
 from gradient_routes.bench.inversion.residuals import Residuals
+from gradient_routes.bench.inversion.step_bias import TOO_LONG, StepBias, step_bias
 from gradient_routes.problems.data.observation import Observation
 from gradient_routes.problems.errors import OUTSIDE
 from gradient_routes.problems.problem import Array, Offers, Problem
@@ -28,18 +29,33 @@ MANY = 50  # parameters, each of which takes a linearized solve
 @dataclass(frozen=True)
 class Fit:
     """Residuals of what was observed; error bars sd (n_p,), nan where the data leave one unbounded; constants as
-    people state them.
+    people state them; what the length of steps in time does to p.
     """
 
     residuals: Residuals
     seen: Observation = field(repr=False)
     sd: Array
     constants: Constants | None = None
+    steps: StepBias | None = None
+
+    @property
+    def verdict(self) -> str:
+        """What is wrong, empty where the model explains the data and its steps are short enough."""
+        return self.residuals.verdict or (TOO_LONG if self._steps else "")
+
+    @property
+    def _steps(self) -> str:
+        return "" if self.steps is None else self.steps.described
+
+    @property
+    def doubts(self) -> str:
+        """Residuals, and steps that are too long."""
+        return "\n".join(filter(None, [self.residuals.described, self._steps]))
 
     @property
     def described(self) -> str:
         told = self.constants.described if self.constants is not None else []
-        return "\n".join([*told, self.residuals.described])
+        return "\n".join([*told, self.doubts])
 
 
 def fit(problem: Problem, found: Evaluation, solver: Solver) -> Fit | None:
@@ -70,7 +86,8 @@ def fit(problem: Problem, found: Evaluation, solver: Solver) -> Fit | None:
     sd = posterior.known(problem, p, H, scale, sigma).sd
     if spread is not None:
         sd = np.hypot(sd, scale * np.linalg.norm(spread(np.linalg.pinv(A, rcond=RANK)[:, : len(H)]), axis=1))
-    return Fit(residuals, seen, sd, stated(problem, found, A, H, seen, sigma, spread))
+    steps = step_bias(problem, p, A, seen, sd, solver)
+    return Fit(residuals, seen, sd, stated(problem, found, A, H, seen, sigma, spread), steps)
 
 
 def beside(problem: Problem, by_p: Sensitivity, state: State, seen: Observation) -> Spread | None:

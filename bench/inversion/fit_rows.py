@@ -18,7 +18,7 @@ def of_all(fit: Fit) -> Row:
     I, z = (None, None) if r.moran is None else (r.moran.I, r.moran.z)
     noise = {"noise": r.noise or None, "noise_source": r.source or None, "chi2": r.chi2 if r.noise else None}
     own = {"data": r.count, "outliers": r.outliers, "freedom": r.freedom, "rms": r.inner_rms}
-    return own | noise | {"moran": I, "moran_z": z, "verdict": r.verdict or "explained"}
+    return own | noise | {"moran": I, "moran_z": z, "verdict": fit.verdict or "explained"}
 
 
 def of_constants(fit: Fit) -> Iterator[Row]:

@@ -79,8 +79,8 @@ class Inversion:
 
     @property
     def unexplained(self) -> bool:
-        """Whether the model does not explain the data: residuals exceed their noise, or the data themselves."""
-        return self.fit is not None and self.fit.residuals.unexplained
+        """Whether residuals exceed their noise, or the data themselves, or steps in time move the answer."""
+        return self.fit is not None and bool(self.fit.verdict)
 
     @property
     def linear_regime(self) -> str | None:
@@ -101,7 +101,7 @@ class Inversion:
         last = len(self.iterates) - 1
         rows = [self.shared | asdict(iterate) | {"ending_solves": None} for iterate in self.iterates]
         rows[last]["ending_solves"] = self.ending_solves
-        doubt = self.fit.residuals.described.replace("\n", "; ") if self.fit is not None and self.unexplained else None
+        doubt = self.fit.doubts.replace("\n", "; ") if self.fit is not None and self.unexplained else None
         says = (rows[last]["says"], self.end, self.linear_regime, doubt, *self.view.remarks)
         rows[last]["says"] = "; ".join(filter(None, says))
         found = {"inversion": rows, "estimates": [self.shared | self._estimate(i) for i in range(self.n_param)]}

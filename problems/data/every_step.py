@@ -58,6 +58,16 @@ class EveryStep:
         """With d = 0, to solve for the state that synthetic data are read from."""
         return replace(self, d=np.zeros((self.steps, len(self.at))))
 
+    def halved(self) -> EveryStep:
+        """The same data in steps half as long."""
+
+        def spread(a: Array | None) -> Array:
+            fine = np.zeros((2 * self.steps, len(self.at)))
+            fine[1::2] = 1.0 if a is None else a
+            return fine
+
+        return replace(self, steps=2 * self.steps, h=self.h / 2.0, d=spread(self.d), w=spread(self.w))
+
     def synthesized(self, u: Array, seed: int) -> EveryStep:
         """With the data read from the states of all steps, plus noise."""
         d = self.read(u)

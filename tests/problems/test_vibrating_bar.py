@@ -155,6 +155,17 @@ def test_histories_of_a_file_are_weighed_where_they_are(tmp_path) -> None:
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12
 
 
+def test_steps_half_as_long_meet_the_same_data(tmp_path) -> None:
+    (tmp_path / "d.csv").write_text(FILE)
+    bar = VibratingBar(n=4, steps=5, dt=0.1, data=str(tmp_path / "d.csv"), modulus=2.0)
+    fine, p = bar.halved(), bar.parameters.start
+    stated = VibratingBar(n=4, steps=10, dt=0.05, data=str(tmp_path / "d.csv"), modulus=2.0)
+    u = Model(fine).solve(p).u
+    assert fine.objective(u, p) == stated.objective(u, p)
+    np.testing.assert_array_equal(fine.residual(u, p), stated.residual(u, p))
+    np.testing.assert_array_equal(fine.observation(u, p).data, bar.observation(Model(bar).solve(p).u, p).data)
+
+
 @pytest.mark.parametrize(
     ("rows", "says"),
     [

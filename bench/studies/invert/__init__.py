@@ -54,8 +54,9 @@ STUDY = Study(
     so. Before "converged" is said, differences of J along two random directions confirm that dJ/dp is 0 there.
 
     Exit code: 0 ended (converged or not, the last line says which), 1 the gradient is not that of J, or the model does
-    not explain the data, or the answer of --linear does not suffice for their noise, or J cannot be evaluated at the
-    start, or --timeout is over, 2 wrong usage, 130 interrupted. What was found by then is shown and kept.""",
+    not explain the data, or shorter steps in time move the answer, or that of --linear does not suffice for the noise,
+    or J cannot be evaluated at the start, or --timeout is over, 2 wrong usage, 130 interrupted. What was found by then
+    is shown and kept.""",
     options=(
         partial(problem_option, required=False),
         routes_option("adjoint"),
