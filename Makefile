@@ -43,7 +43,7 @@ measured: $(READY) ## measurements to constants, wrong models flagged: a publish
 	$(BIN)/routes identify --problem '$(ROD),parts=2]' --no-plot
 	-$(BIN)/routes invert --problem '$(ROD)]' --no-plot
 	$(BIN)/routes invert --problem '$(ROD),parts=2]' --no-plot
-	$(BIN)/routes invert --problem '$(WALL),steps=31,dt=10min]' --optimizer gauss-newton --no-plot
+	-$(BIN)/routes invert --problem '$(WALL),steps=31,dt=10min]' --optimizer gauss-newton --no-plot
 	$(BIN)/routes invert --problem '$(WALL),steps=151,dt=2min,scheme=crank-nicolson]' --optimizer gauss-newton --no-plot
 	$(BIN)/routes report -o results/report.html
 

@@ -19,6 +19,7 @@ from gradient_routes.problems.data.every_step import EveryStep
 from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.dynamics.impulses import ImpulsesByMaterial
+from gradient_routes.problems.dynamics.scheme import moved_on
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.fem.boundary_conditions import BoundaryConditions
 from gradient_routes.problems.fem.elements import SolidElement
@@ -260,14 +261,10 @@ class ImpactBlock(Transient):
         return self._matrix(-1.0, self.stiffness(v[: self.n], p))
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
-        rates = self.rates(t - 1, np.stack([v, u]), p)
-        assert rates.R_p is not None
-        return Linearization(rates.R_p, rates.J_u[0], rates.J_p[0])
+        return self.rates(t - 1, np.stack([v, u]), p).single
 
     def step_initial(self, t: Any, v: Any, p: Any, xp: Any = np) -> Any:
-        """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
-        x, velocity = v.reshape(2, -1)
-        return xp.concatenate([x + self.h * velocity, velocity])
+        return moved_on(v, self.h, xp)
 
     def step_active_set(self, t: int, u: Array, p: Array) -> Hashable | None:
         return self.plane.active_set(u[: self.n])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gradient_routes.problems.problem import Array, Operator
+from gradient_routes.problems.problem import Array, Linearization, Operator
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,13 @@ class Rates:
     J_p: Array
     by_p: Callable[[Array], Array]
     R_p: Operator | None = None
+
+    @property
+    def single(self) -> Linearization:
+        """Of one step."""
+        assert self.R_p is not None
+        (J_u,), (J_p,) = self.J_u, self.J_p
+        return Linearization(self.R_p, J_u, J_p)
 
 
 class Stacked:

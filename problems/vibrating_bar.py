@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -23,11 +22,11 @@ from gradient_routes.problems.data.observation import Candidates, Observation
 from gradient_routes.problems.data.regularization import Prior
 from gradient_routes.problems.data.sensors import Nodes, parse_nodes
 from gradient_routes.problems.data.units import standard_deviation
+from gradient_routes.problems.dynamics.bar_impulses import ImpulsesByParameters, elongation, spread
 from gradient_routes.problems.dynamics.bar_unknowns import UNIT_OF, BarUnknowns
 from gradient_routes.problems.dynamics.both_sides import BothSides
-from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName
+from gradient_routes.problems.dynamics.scheme import SCHEMES, SchemeName, moved_on
 from gradient_routes.problems.errors import DomainError, InputError, NotOffered, check_applies
-from gradient_routes.problems.matrices.by_products import ByProducts
 from gradient_routes.problems.matrices.recurrence import Recurrence
 from gradient_routes.problems.matrices.step_matrix import Banded, StepMatrix
 from gradient_routes.problems.problem import Array, Linearization, Offers, ParameterView, Traced
@@ -196,7 +195,7 @@ class VibratingBar(Transient):
         """R (m, 2, N) of m steps from displacements, velocities (m + 1, N) and F (m + 1,) before and after them."""
         h, scheme, k = self.h, self.scheme, self.stiffness(p, xp)
         moved = self.row * (x[1:] - x[:-1] - h * scheme.velocity(v))
-        driven = self.mass * (v[1:] - v[:-1]) + h * scheme.force(_spread(k * _elongation(x, xp), xp))
+        driven = self.mass * (v[1:] - v[:-1]) + h * scheme.force(spread(k * elongation(x, xp), xp))
         for name, c in self.unknowns.damping(p, xp).items():
             driven = driven + h * c * scheme.damping(self._resistance(name, v, k, xp))
         pushed = -F if self.stop is None else self.stop.law.force(x[:, -1] - self.stop.gap, xp) - F
@@ -208,7 +207,7 @@ class VibratingBar(Transient):
         if name == "c_M":
             return self.mass * v
         if name == "c_K":
-            return _spread(k * _elongation(v, xp), xp)
+            return spread(k * elongation(v, xp), xp)
         end = xp.zeros_like(v[:, :1])
         return self.mass[0] * xp.concatenate([v[:, 1:], end], axis=1) - self.mass[0] * xp.concatenate(
             [end, v[:, :-1]], axis=1
@@ -269,14 +268,10 @@ class VibratingBar(Transient):
         return self.pressed_matrix(self.step_matrices(p)[1], v[self.n - 1])
 
     def step_linearize(self, t: int, u: Array, v: Array, p: Array) -> Linearization:
-        rates = self.rates(t - 1, np.stack([v, u]), p)
-        assert rates.R_p is not None
-        return Linearization(rates.R_p, rates.J_u[0], rates.J_p[0])
+        return self.rates(t - 1, np.stack([v, u]), p).single
 
     def step_initial(self, t: Any, v: Any, p: Any, xp: Any = np) -> Any:
-        """Moved on by the velocity before the step: a state that leaves nothing in the rows of u."""
-        x, velocity = v.reshape(2, -1)
-        return xp.concatenate([x + self.h * velocity, velocity])
+        return moved_on(v, self.h, xp)
 
     def step_active_set(self, t: int, u: Array, p: Array) -> str | None:
         return None if self.stop is None else self.stop.law.active_set(u[self.n - 1] - self.stop.gap)
@@ -323,9 +318,9 @@ class VibratingBar(Transient):
         )
         w, resistances = None, []
         if "moduli" in unknowns.kinds:
-            w = h * scheme.force(_elongation(x, np))
+            w = h * scheme.force(elongation(x, np))
             if "c_K" in c:
-                w += h * c["c_K"] * scheme.damping(_elongation(v, np))
+                w += h * c["c_K"] * scheme.damping(elongation(v, np))
             w *= by_p[unknowns.slice("moduli")] * (self.A / self.L_e)
         if "damping" in unknowns.kinds:
             k = self.stiffness(p)
@@ -361,7 +356,7 @@ class VibratingBar(Transient):
     def energy(self, states: Array, p: Array) -> Array:
         """Kinetic energy, and that of elements and stops, (k,) [J], of real states (k, 2 N)."""
         x, v = self.histories(states)
-        E = 0.5 * (self.stiffness(p) * _elongation(x, np) ** 2).sum(axis=1) + 0.5 * (self.mass * v**2).sum(axis=1)
+        E = 0.5 * (self.stiffness(p) * elongation(x, np) ** 2).sum(axis=1) + 0.5 * (self.mass * v**2).sum(axis=1)
         return np.asarray(E if self.stop is None else E + self.stop.law.energy(x[:, -1] - self.stop.gap))
 
     def energy_growth(self, u: Array, p: Array) -> float | None:
@@ -430,49 +425,3 @@ class VibratingBar(Transient):
         if self.unknowns.kinds != ("moduli",):
             return shares
         return replace(shares, columns={"x": self.x, "E": self.unknowns.moduli(p), **shares.columns})
-
-
-class ImpulsesByParameters:
-    """R_p of k steps, (k 2 N, n_p), of p = (moduli, damping, velocities).
-
-    w            (k, N): column e of the moduli is the impulses [N s] of element e, stretched by w
-    resistances  (k, N) [N s] each, of the coefficients of damping
-    """
-
-    def __init__(self, w: Array | None, resistances: Sequence[Array], n_p: int, shape: tuple[int, int]) -> None:
-        self.w, self.resistances, self.n_p, self.shape = w, resistances, n_p, shape
-        self.first = 0 if w is None else w.shape[1]
-
-    @property
-    def T(self) -> ByProducts:
-        return ByProducts(lambda lam: self.each_transposed(lam.reshape(len(self), -1)).sum(axis=0), self.__matmul__)
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __matmul__(self, dp: Array) -> Array:
-        driven = np.zeros(
-            self.shape, np.result_type(dp, *(part for part in (self.w, *self.resistances) if part is not None))
-        )
-        if self.w is not None:
-            driven += _spread(self.w * dp[: self.first], np)
-        for resistance, dc in zip(self.resistances, dp[self.first :], strict=False):
-            driven += resistance * dc
-        return np.concatenate([np.zeros_like(driven), driven], axis=1).ravel()
-
-    def each_transposed(self, lam: Array) -> Array:
-        impulses = lam[:, self.shape[1] :]
-        parts = [] if self.w is None else [self.w * _elongation(impulses, np)]
-        parts += [(resistance * impulses).sum(axis=1, keepdims=True) for resistance in self.resistances]
-        known = sum(part.shape[1] for part in parts)
-        return np.concatenate([*parts, np.zeros((len(lam), self.n_p - known), lam.dtype)], axis=1)
-
-
-def _elongation(x: Any, xp: Any) -> Any:
-    """B x of every row, (.., N)."""
-    return xp.concatenate([x[:, :1], x[:, 1:] - x[:, :-1]], axis=1)
-
-
-def _spread(q: Any, xp: Any) -> Any:
-    """B^T q of every row, (.., N)."""
-    return xp.concatenate([q[:, :-1] - q[:, 1:], q[:, -1:]], axis=1)

@@ -24,7 +24,7 @@ from gradient_routes.bench.store.replacing import check_folder, replacing
 from gradient_routes.bench.store.store import BESIDE, SQLITE
 from gradient_routes.problems.errors import InputError, RoutesError
 
-TODO = "name a file you may write"
+REMEDY = "name a file you may write"
 PARTS = re.compile(r"[\[\],=|]")  # of a selector
 
 
@@ -108,7 +108,7 @@ class Output:
         try:
             yield
         except OSError as error:
-            raise kind(f"{self}: {error.strerror or error} - {TODO}") from error
+            raise kind(f"{self}: {error.strerror or error} - {REMEDY}") from error
 
 
 def read_by(*named: Path | str | None) -> list[Path]:
