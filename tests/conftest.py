@@ -41,7 +41,6 @@ from click.testing import CliRunner
 from commands import Ran, Shell
 from duffing.problem import Duffing
 from forks import Forks
-from rewriting import rewrite_all
 
 from gradient_routes.bench.cli import main
 from gradient_routes.problems.advection import Advection
@@ -130,13 +129,6 @@ def somewhere(problem: Problem, seed: int = 0) -> Array:
 
 def relative_error(g: Array, reference: Array) -> float:
     return float(np.linalg.norm(g - reference) / np.linalg.norm(reference))
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_sessionstart(session: pytest.Session) -> None:
-    config = session.config
-    if config.getoption("numprocesses", None) and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
-        rewrite_all(config, ROOT / "tests")
 
 
 @pytest.fixture(autouse=True)
