@@ -72,7 +72,7 @@ def run(
 ) -> DataFrame:
     """dJ/dp by every route named on every problem named: what each costs and how wrong it is. `routes run`.
 
-    at          the p: "start", "true" or a CSV file of one column
+    at          the p: "start", "true", values ("0.1,0,-0.3" or "log E_1=0.1,log E_3=-0.3") or a CSV file of one column
     components  only so many components of dJ/dp, drawn at random; `directions`: only slopes of J along so many
     seed        of these
     budget      gradients that are predicted to take more seconds are skipped

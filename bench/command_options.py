@@ -23,8 +23,9 @@ STORE = Path("results") / "routes.sqlite"
 FINISHED = "what is finished is printed, and kept unless --no-store"
 SELECTOR = "NAME, 'NAME[key=value,key=a|b]' (in quotes: [ and | are special to shells) or all. May be repeated."
 AT = (
-    "Point p of the gradient; a file has a header line and n_p values in one column, or names and values as invert -o,"
-    " run --gradient and export --table estimates write them."
+    "Point p of the gradient. Values: all, 0.1,0,-0.3, or some by name, 'log E_1=0.1,log E_3=-0.3', others as at the"
+    " start. A file has a header line and n_p values in one column, or names and values as invert -o, run --gradient"
+    " and export --table estimates write them. What exists as a file is one."
 )
 LINEAR_SOLVERS = [*points()]
 NEWTONS = ["auto", "full", "inexact"]
@@ -36,7 +37,7 @@ store_option = click.option(
 )
 no_store_option = click.option("--no-store", is_flag=True, help="Store nothing.")
 debug_option = click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks of errors.")
-at_option = click.option("--at", default="start", show_default=True, metavar="start|true|FILE.csv", help=AT)
+at_option = click.option("--at", default="start", show_default=True, metavar="start|true|VALUES|FILE.csv", help=AT)
 rtol_option = click.option(
     "--rtol",
     type=FRACTION,

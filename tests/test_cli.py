@@ -356,6 +356,7 @@ def test_version_says_version_commit_and_python(cli, tmp_path: Path) -> None:
         ("run --problem bar --route f", {"fd-one-sided", "fd-central", "faulty-adjoint"}),
         ("vcurve --problem b", {"bar", "block"}),
         ("run --problem ./my_m", {"./my_m"}),
+        ("run --at ", {"start", "true"}),
     ],
 )
 def test_completion_offers_registered_names(words: str, offered: set[str], tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.imported import is_reference
 from gradient_routes.bench.cases.point_file import read_point
+from gradient_routes.bench.cases.point_values import are_values, shown, values_of
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.problems.errors import InputError
 from gradient_routes.problems.problem import Array, Parameters, Problem
@@ -173,14 +174,16 @@ def _grids(kind: registry.Kind, text: str) -> list[selector.Selector]:
 
 
 def point(problem: Problem, at: str) -> Array:
-    """p (n_p,) for `start`, `true` or a CSV file, see `read_point`. Raises InputError, DomainError."""
+    """p (n_p,) for `start`, `true`, values or a CSV file, see `read_point`. Raises InputError, DomainError."""
     if at == "start":
         return problem.parameters.check(problem.parameters.start.copy(), f"{problem.name}, start")
     if at == "true":
         truth = problem.truth()
         if truth is None:
-            raise InputError(f"{problem.name}: the true parameters are not known - use --at start or --at FILE.csv")
+            raise InputError(f"{problem.name}: the true parameters are not known - use --at start, values or FILE.csv")
         return problem.parameters.check(truth, f"{problem.name}, true")
+    if are_values(at):
+        return problem.parameters.check(values_of(problem.parameters, at), f"--at {shown(at)}")
     return problem.parameters.check(read_point(problem, at), at)
 
 

@@ -40,12 +40,12 @@ ESTIMATE = "what the solves leave in g, estimated: |g - g'|_2 / |g'|_2, g' of ad
 WHAT = (
     Column("problem", "TEXT", "", "selector of the problem, or whose code was checked"),
     Column("route", "TEXT", "", "selector of the route that gave the gradient; NULL for other people's code"),
-    Column("at", "TEXT", "", "the p it was asked at: start, true or a file"),
+    Column("at", "TEXT", "", "the p it was asked at: start, true, values or a file"),
 )
 PROBLEM = (
     Column("problem", "TEXT", "", "name of the problem"),
     Column("problem_options", "TEXT", "", "its options, defaults included", json=True),
-    Column("at", "TEXT", "", "the p it was studied at: start, true or a file"),
+    Column("at", "TEXT", "", "the p it was studied at: start, true, values or a file"),
     Column("n_state", "INTEGER", "1", "n_u, free unknowns"),
     Column("n_param", "INTEGER", "1", "n_p, parameters"),
 )

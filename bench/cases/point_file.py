@@ -47,14 +47,14 @@ def read_point(problem: Problem, path: str) -> Array:
             raise InputError(f"{path}: {converted[0]} is in {units[names.index(converted[0])]}, not in Pa - convert it")
         return problem.parameters.check(completed, path)
     if other:
-        raise InputError(f"{path}: {other[0]} is no parameter of {problem.name}: {_listed(wanted)} - choose its law")
+        raise InputError(f"{path}: {other[0]} is no parameter of {problem.name}: {listed(wanted)} - choose its law")
     if len(given) < len(wanted):
         absent = [name for name in wanted if name not in given]
-        raise InputError(f"{path}: has no {_listed(absent)} of {problem.name} - give all parameters")
+        raise InputError(f"{path}: has no {listed(absent)} of {problem.name} - give all parameters")
     return np.array([given[name] for name in wanted])
 
 
-def _listed(names: Iterable[str]) -> str:
+def listed(names: Iterable[str]) -> str:
     """The first of them."""
     first = list(islice(names, LISTED + 1))
     return ", ".join(first[:LISTED]) + (", ..." if len(first) > LISTED else "")

@@ -23,7 +23,7 @@ COLUMNS = (
     Column("problem_options", "TEXT", "", "its options, defaults included", json=True),
     Column("route", "TEXT", "", "name of the route"),
     Column("route_options", "TEXT", "", "its options, as resolved for this case", json=True),
-    Column("at", "TEXT", "", "the p it was computed at: start, true or a file"),
+    Column("at", "TEXT", "", "the p it was computed at: start, true, values or a file"),
     Column("status", "TEXT", "", f"{', '.join(STATUSES)}"),
     Column("reason", "TEXT", "", "why it is not ok"),
     Column("note", "TEXT", "", "what should be read beside the numbers"),

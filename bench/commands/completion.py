@@ -1,4 +1,4 @@
-"""Shell completion of --problem and --route: the registered names, read without importing what they name."""
+"""Shell completion of --problem, --route and --at; registered names are read without importing what they name."""
 
 from __future__ import annotations
 
@@ -26,12 +26,22 @@ class Selector(click.types.StringParamType):
         return matching or [CompletionItem(incomplete, type="file")]
 
 
-SELECTORS = {f"--{kind}": Selector(f"gradient_routes.{kind}s") for kind in ("problem", "route")}
+class Point(click.types.StringParamType):
+    """Text that names a point p, completed by the words for one and by files."""
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        from click.shell_completion import CompletionItem
+
+        words = [CompletionItem(word) for word in ("start", "true") if word.startswith(incomplete)]
+        return [*words, CompletionItem(incomplete, type="file")]
+
+
+COMPLETED = {f"--{kind}": Selector(f"gradient_routes.{kind}s") for kind in ("problem", "route")} | {"--at": Point()}
 
 
 def with_completion(command: click.Command) -> click.Command:
-    """The command, its --problem and --route completed."""
+    """The command, these options of it completed."""
     for parameter in command.params:
         for option in parameter.opts:
-            parameter.type = SELECTORS.get(option, parameter.type)
+            parameter.type = COMPLETED.get(option, parameter.type)
     return command

@@ -37,7 +37,7 @@ def subject_of(thing: Any, name: str, start: Any = None) -> Subject:
         raise
     except FOREIGN as failure:  # attributes may be properties, which run user code
         raise InputError(f"check: {name} cannot be read: {type(failure).__name__}: {failure} - correct it") from failure
-    raise InputError(f"check: {name} has no start - give it one, an array (n_p,), or a point with --at FILE.csv")
+    raise InputError(f"check: {name} has no start - give it one, an array (n_p,), or a point with --at")
 
 
 def functions_of(thing: Any, name: str) -> tuple[Callable[[Array], Any], Callable[[Array], Any]]:

@@ -13,6 +13,7 @@ from rich.text import Text
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.case import selector_of
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.point_values import shown
 from gradient_routes.bench.cases.settings import Settings
 from gradient_routes.bench.render.terminal.terminal import Terminal
 from gradient_routes.bench.render.terminal.text_table import TextTable
@@ -92,7 +93,7 @@ def asked(row: Row) -> str:
     """The problem, and the settings of its run that differ from the defaults."""
     settings = row["settings"] or {}
     unusual = [f"{name}={settings[name]}" for name, usual in DEFAULTS.items() if settings.get(name, usual) != usual]
-    unusual += [] if row["at"] == "start" else [f"at {row['at']}"]
+    unusual += [] if row["at"] == "start" else [f"at {shown(row['at'])}"]
     unusual += [] if settings.get("timed", True) else ["not timed"]
     unusual += [] if settings.get("threads", 1) == 1 else [f"{settings['threads']} threads"]
     return ", ".join([titled(row), *unusual])

@@ -8,6 +8,7 @@ from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.folder import located
 from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
 from gradient_routes.bench.cases.imported import imported
+from gradient_routes.bench.cases.point_values import are_values, values
 from gradient_routes.bench.cases.study import Found, Say
 from gradient_routes.bench.protocols import forward, is_foreign
 from gradient_routes.bench.protocols.target import model_of
@@ -109,15 +110,17 @@ def _subject(
     if objective is None or gradient is None:
         raise InputError("check: --objective and --gradient go together - give both")
     if start is None:
-        raise InputError("check: two functions have no start - give the point with --at FILE.csv")
+        raise InputError("check: two functions have no start - give the point with --at, values or a file")
     return foreign.subject(imported(objective), imported(gradient), start, name=gradient)
 
 
 def _start(at: str) -> Array | None:
-    """The point of a file; None for that of the code itself."""
+    """The point named; None for that of the code itself."""
     if at == "true":
-        raise InputError("check: --at true is for registered problems with synthetic data - give a file")
-    return None if at == "start" else _column(at)
+        raise InputError("check: --at true is for registered problems with synthetic data - give values or a file")
+    if at == "start":
+        return None
+    return values(at) if are_values(at) else _column(at)
 
 
 def _column(file: str) -> Array:

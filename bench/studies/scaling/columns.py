@@ -7,7 +7,7 @@ from gradient_routes.bench.cases.column import PROBLEM, Column
 SCALING_FITS = (
     Column("problem", "TEXT", "", "name of the problem"),
     Column("problem_options", "TEXT", "", "its options but for those that make its size", json=True),
-    Column("at", "TEXT", "", "the p it was differentiated at: start, true or a file"),
+    Column("at", "TEXT", "", "the p it was differentiated at: start, true, values or a file"),
     Column("route", "TEXT", "", "name of the route"),
     Column("route_options", "TEXT", "", "its options as asked for; data-dependent ones NULL", json=True),
     Column(

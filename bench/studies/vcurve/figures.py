@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.point_values import shown
 from gradient_routes.bench.render.figure import Figure, Section, Told
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.picking import tabulate
@@ -71,7 +72,7 @@ def line(row: Row) -> tuple[str, str, float | None]:
 
 def named(row: Row) -> str:
     name = f"{row['problem']} by {row['route']}" if row["route"] else str(row["problem"])
-    return name if row["at"] in ("start", None) else f"{name}, at {row['at']}"
+    return name if row["at"] in ("start", None) else f"{name}, at {shown(row['at'])}"
 
 
 def told(check: Row) -> Told:
