@@ -9,6 +9,7 @@ from gradient_routes.bench.commands.completion import with_completion
 from gradient_routes.bench.commands.environments import environments
 from gradient_routes.bench.commands.export import export
 from gradient_routes.bench.commands.group import Routes
+from gradient_routes.bench.commands.lab import lab
 from gradient_routes.bench.commands.list import list_
 from gradient_routes.bench.commands.merge import merge
 from gradient_routes.bench.commands.report import report
@@ -17,7 +18,7 @@ from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
 from gradient_routes.bench.studies.command import commands_of_studies
 
-OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline, environments, serve]
+OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline, environments, serve, lab]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
 

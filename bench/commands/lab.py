@@ -1,0 +1,50 @@
+"""`routes lab`: the laboratory in a browser."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import click
+
+from gradient_routes.bench.command_options import complain, debug_option
+from gradient_routes.bench.commands.group import INTERRUPTED, leave
+from gradient_routes.bench.commands.interrupts import over
+from gradient_routes.bench.ranges import Whole
+from gradient_routes.bench.sanitize import echo
+from gradient_routes.problems.errors import InputError
+
+PORT = "0: any that is free."
+NEEDED = ("panel", "bokeh", "latex2mathml")
+
+
+@click.command()
+@click.option("--port", type=Whole(0, 65_535), default=5080, show_default=True, help=PORT)
+@click.option("--browser/--no-browser", default=True, show_default=True, help="Open a browser.")
+@debug_option
+def lab(port: int, browser: bool) -> None:
+    """Pages to play on, in the browser: derive the adjoint, invert a bar, compare routes, until Ctrl-C.
+
+    What moves on a page is computed by commands of `routes`, which it shows. It listens on this machine only.
+    In a notebook: gradient_routes.lab.bar().
+    """
+    if missing := [name for name in NEEDED if find_spec(name) is None]:
+        raise InputError(f"lab: {', '.join(missing)} not installed - pip install 'gradient-routes[lab]'")
+    import webbrowser
+
+    from gradient_routes.bench.lab.server import Laboratory
+
+    laboratory = Laboratory(port)
+
+    def ready(url: str) -> None:
+        echo(f"{url} until Ctrl-C")
+        if browser:
+            webbrowser.open(url)
+
+    try:
+        laboratory.serve(ready)
+    except KeyboardInterrupt:
+        over()
+        complain("interrupted - the laboratory is closed")
+        leave(INTERRUPTED)
+    except OSError as error:
+        raise InputError(f"lab: port {port}: {error.strerror} - name another by --port, or 0") from error

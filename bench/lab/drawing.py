@@ -1,0 +1,40 @@
+"""Figures of the pages: Bokeh draws them in the colours of the reports, on paper and at night."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from bokeh.models import HoverTool
+from bokeh.plotting import figure
+
+from gradient_routes.bench.render.style import of_route
+
+INK = "#7d858e"  # seen on paper and at night
+
+
+def colour(route: str) -> str:
+    """That of a route, to be seen on paper and at night."""
+    return of_route(route).light
+
+
+def plot(
+    x: str, y: str, *, title: str = "", height: int = 260, hover: Iterable[tuple[str, str]] = (), **options: Any
+) -> figure:
+    """An empty figure, as wide as there is room; its ink is that of the page, see lab.css.
+
+    hover   pairs of a label and what is shown, as Bokeh writes it
+    """
+    drawn = figure(
+        title=title or None,
+        x_axis_label=x,
+        y_axis_label=y,
+        height=height,
+        sizing_mode="stretch_width",
+        toolbar_location=None,
+        tools="",
+        **options,
+    )
+    if hover:
+        drawn.add_tools(HoverTool(tooltips=[*hover]))
+    return drawn

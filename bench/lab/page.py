@@ -1,0 +1,49 @@
+"""What is around a part: its title, links to the others, the command and how it stands."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+import panel as pn
+
+from gradient_routes.bench.lab.part import Part
+from gradient_routes.bench.lab.parts import PARTS, load
+
+
+@cache
+def text(name: str) -> str:
+    """A file beside this one."""
+    return files("gradient_routes.bench.lab").joinpath(name).read_text(encoding="utf-8")
+
+
+def inside(part: Part) -> pn.Column:
+    """The part with its command and its state, for a page or a cell of a notebook."""
+    column = pn.Column(part.content(), part.status, part.shown, sizing_mode="stretch_width")
+    for pane in column.select(pn.pane.HTML):
+        pane.stylesheets = [*pane.stylesheets, text("inside.css")]
+    return column
+
+
+def page(part: Part) -> pn.Template:
+    """The whole page of a part."""
+    template = pn.Template(text("page.html"), location=True)
+    for name, value in {
+        "css": text("lab.css"), "js": text("page.js"), "here": part.slug, "lead": part.lead, "heading": part.title,
+        "parts": [(slug, load(slug).title) for slug in PARTS],
+    }.items():  # fmt: skip
+        template.add_variable(name, value)
+    template.add_panel("part", inside(part))
+    return template
+
+
+def overview() -> str:
+    """The first page: what there is."""
+    from html import escape
+
+    from jinja2 import Template
+
+    cards = "".join(
+        f'<a href="/{slug}"><h2>{escape(load(slug).title)}</h2><p>{escape(load(slug).lead)}</p></a>' for slug in PARTS
+    )
+    return str(Template(text("overview.html"), autoescape=False).render(css=text("lab.css"), cards=cards))

@@ -1,0 +1,231 @@
+"""A part of the laboratory: what is chosen on the page is a state, the state is a command of `routes` and a URL."""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import shlex
+from collections.abc import Callable, Mapping
+from contextlib import aclosing
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import urlencode
+
+import panel as pn
+import param
+from bokeh.document import Document
+
+from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.execution.isolation.channel import Job
+from gradient_routes.bench.execution.isolation.messages import Ended, Message
+from gradient_routes.bench.lab.pool import Pool
+from gradient_routes.bench.lab.shell import Command, Exited, Said
+from gradient_routes.problems.errors import InputError
+
+WRONG_USAGE = 2
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a part computes.
+
+    quick   for what follows every move of a slider
+    long    for what is asked for by a button
+    folder  of this session alone: uploads, and what commands read
+    """
+
+    quick: Pool
+    long: Pool
+    folder: Path
+
+
+class Part(param.Parameterized):
+    """Its state are its parameters: numbers, choices, switches, lists of numbers. A change computes the command anew.
+
+    A part declares them, writes `command`, `content` and `take`, and draws what arrives. The newest state wins: those
+    that were left while a command ran are skipped. Where `at_once` is False it runs at `start` only, until `stop`.
+    """
+
+    slug: ClassVar[str]
+    title: ClassVar[str]
+    lead: ClassVar[str]
+    at_once: ClassVar[bool] = True
+
+    def __init__(self, place: Place, query: Mapping[str, str] | None = None) -> None:
+        super().__init__()
+        self.place = place
+        self.status = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["status"])
+        self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
+        self._defaults = {name: self.param[name].default for name in self.fields}
+        self._document: Document | None = pn.state.curdoc
+        self._moves = 0
+        self._following: asyncio.Task[None] | None = None
+        refused = self._read(query or {})
+        self.param.watch(self._changed, self.fields)
+        self._show()
+        self.say(*refused)
+
+    # what a part writes
+
+    def command(self) -> tuple[str, ...]:
+        """The arguments of `routes` that compute what is shown. Raises InputError where the state has none."""
+        raise NotImplementedError
+
+    def job(self) -> Job:
+        """What is computed: that command, unless a part needs more than its rows."""
+        return Command(self.command(), self.place.folder)
+
+    def content(self) -> pn.viewable.Viewable:
+        """What is seen. Asked for once."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """A job begins."""
+
+    def take(self, message: Message) -> None:
+        """A row has come, or what `job` says."""
+
+    def end(self, end: Ended, code: int) -> None:
+        """The job has ended; its exit code."""
+
+    # the state
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of the state."""
+        return [name for name in self.param if name != "name" and (self.param[name].precedence or 0) >= 0]
+
+    def query(self) -> str:
+        """The state as the search of a URL: what differs from the defaults."""
+        state = {name: getattr(self, name) for name in self.fields}
+        return urlencode({name: written(v) for name, v in state.items() if v != self._defaults[name]}, safe=",")
+
+    def url(self) -> str:
+        """The address of this state."""
+        return f"/{self.slug}?{self.query()}".rstrip("?")
+
+    def _read(self, query: Mapping[str, str]) -> list[str]:
+        """Take the state of a URL; why parts of it are not taken."""
+        refused = []
+        for name, text in query.items():
+            if name in self.fields:
+                try:
+                    setattr(self, name, read(self.param[name], text))
+                except (ValueError, TypeError) as error:
+                    refused.append(f"{name}={text[:40]}: {error} - {name} stays {written(getattr(self, name))}")
+        return refused
+
+    def say(self, *lines: str, bad: bool = True) -> None:
+        """Show lines where the page says how it stands; read aloud by screen readers."""
+        kind = "bad" if bad and lines else "quiet"
+        self.status.object = f'<p role="status" class="{kind}">{"<br>".join(map(html.escape, lines))}</p>'
+
+    # the commands
+
+    def _changed(self, *_: Any) -> None:
+        self._show()
+        if self.at_once:
+            self.start()
+
+    def _show(self) -> None:
+        """The command and the URL of the state."""
+        try:
+            text = f"routes {shlex.join(self.command())}"
+        except InputError as error:
+            text = str(error)
+        self.shown.object = (
+            f'<div class="command"><code tabindex="0">{html.escape(text)}</code>'
+            f'<button type="button" class="copy" data-copy="{html.escape(text)}">copy command</button>'
+            f'<button type="button" class="copy" data-link="{html.escape(self.url())}">copy link</button></div>'
+        )
+        if pn.state.location is not None and self._document is not None:
+            pn.state.location.search = f"?{self.query()}".rstrip("?")
+
+    def start(self) -> None:
+        """Compute the newest state, now or when what runs has ended."""
+        self._moves += 1
+        if self._following is None or self._following.done():
+            self._following = asyncio.get_running_loop().create_task(self._follow())
+
+    def stop(self) -> None:
+        """End what runs."""
+        if self._following is not None:
+            self._following.cancel()
+
+    @property
+    def running(self) -> bool:
+        """Whether a command runs, or waits for a process."""
+        return self._following is not None and not self._following.done()
+
+    async def _follow(self) -> None:
+        """Run the command of the state until it is that of the newest one."""
+        done = -1
+        while done != self._moves:
+            done = self._moves
+            try:
+                job = self.job()
+            except InputError as error:
+                self._later(self.say, str(error))
+            else:
+                await self._run(job)
+
+    async def _run(self, job: Job) -> None:
+        said: list[str] = []
+        code = 0
+        self._later(self.begin)
+        pool = self.place.quick if self.at_once else self.place.long
+        try:
+            async with aclosing(pool.messages(job)) as messages:
+                async for message in messages:
+                    match message:
+                        case Said(text):
+                            said.append(text.removeprefix("routes: "))
+                        case Exited(code):
+                            pass
+                        case Ended():
+                            self._later(self._ended, message, code, said)
+                        case _:
+                            self._later(self.take, message)
+        except asyncio.CancelledError:
+            self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
+            raise
+
+    def _ended(self, end: Ended, code: int, said: list[str]) -> None:
+        failed = end.status is not Status.OK
+        self.say(*said, *([end.line(self.slug)] if failed else []), bad=failed or code == WRONG_USAGE)
+        self.end(end, code)
+
+    def _later(self, change: Callable[..., None], *arguments: Any) -> None:
+        """Change what is shown, in the turn of its document where there is one."""
+        if self._document is None or self._document.session_context is None:
+            change(*arguments)
+        else:
+            self._document.add_next_tick_callback(partial(change, *arguments))
+
+
+def written(value: Any) -> str:
+    """A value of a state as text."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ",".join(map(written, value))
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def read(declared: param.Parameter, text: str) -> Any:
+    """A value of a state from text. Raises ValueError; that it is within its bounds is for the parameter to say."""
+    match declared:
+        case param.Boolean():
+            if text not in ("yes", "no"):
+                raise ValueError("is yes or no")
+            return text == "yes"
+        case param.Integer():
+            return int(text)
+        case param.Number():
+            return None if text == "None" else float(text)
+        case param.List():
+            kind = declared.item_type or str
+            return [kind(item) for item in text.split(",") if item]
+    return text
