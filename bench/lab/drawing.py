@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from bokeh.models import HoverTool
+from bokeh.models import HoverTool, Legend
 from bokeh.plotting import figure
 
 from gradient_routes.bench.render.style import of_route
 
+LABELS = ".bk-label { color: var(--ink, inherit) !important }"  # a legend is no canvas: --bk-* do not reach it
 INK = "#7d858e"  # seen on paper and at night
 
 
@@ -21,7 +22,7 @@ def colour(route: str) -> str:
 def plot(
     x: str, y: str, *, title: str = "", height: int = 260, hover: Iterable[tuple[str, str]] = (), **options: Any
 ) -> figure:
-    """An empty figure, as wide as there is room; its ink is that of the page, see lab.css.
+    """An empty figure, as wide as there is room, its legend above; its ink is that of the page, see lab.css.
 
     hover   pairs of a label and what is shown, as Bokeh writes it
     """
@@ -35,6 +36,8 @@ def plot(
         tools="",
         **options,
     )
+    legend = Legend(orientation="horizontal", border_line_color=None, background_fill_alpha=0.0, stylesheets=[LABELS])
+    drawn.add_layout(legend, "above")
     if hover:
         drawn.add_tools(HoverTool(tooltips=[*hover]))
     return drawn

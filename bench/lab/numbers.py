@@ -34,9 +34,9 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
     return f'<div class="scroll"><table>{named}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def vector(name: str, v: Array, labels: Sequence[str], unit: str = "") -> str:
+def vector(head: str, v: Array, labels: Sequence[str], name: str) -> str:
     """One row, a component a column."""
-    return table([f"{name}{f' [{unit}]' if unit else ''}", *labels], [["", *map(number, map(float, v))]])
+    return table([head, *labels], [[name, *map(number, map(float, v))]])
 
 
 def matrix(name: str, A: Array, digits: int = 3) -> str:

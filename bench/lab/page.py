@@ -20,8 +20,8 @@ def text(name: str) -> str:
 def inside(part: Part) -> pn.Column:
     """The part with its command and its state, for a page or a cell of a notebook."""
     column = pn.Column(part.content(), part.status, part.shown, sizing_mode="stretch_width")
-    for pane in column.select(pn.pane.HTML):
-        pane.stylesheets = [*pane.stylesheets, text("inside.css")]
+    for seen in column.select(lambda part: isinstance(part, pn.pane.HTML | pn.widgets.Widget)):
+        seen.stylesheets = [*seen.stylesheets, text("inside.css")]
     return column
 
 

@@ -60,7 +60,7 @@ class Part(param.Parameterized):
         self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
-        self._moves = 0
+        self._moves, self.pushed = 0, nothing
         self._following: asyncio.Task[None] | None = None
         refused = self._read(query or {})
         self.param.watch(self._changed, self.fields)
@@ -201,8 +201,13 @@ class Part(param.Parameterized):
         """Change what is shown, in the turn of its document where there is one."""
         if self._document is None or self._document.session_context is None:
             change(*arguments)
+            self.pushed()
         else:
             self._document.add_next_tick_callback(partial(change, *arguments))
+
+
+def nothing() -> None:
+    """A document sends its changes by itself; a notebook is told to."""
 
 
 def written(value: Any) -> str:

@@ -43,6 +43,10 @@ class Lane:
     first: Job = BAR
 
 
+QUICK = Lane(workers=2, timeout=20.0)
+LONG = Lane(workers=1, timeout=300.0, patience=10)
+
+
 class Over(Exception):
     """The time of a job is over, or nobody waits for it any more."""
 

@@ -16,11 +16,9 @@ from tornado.web import RequestHandler
 from gradient_routes.bench.lab.page import overview, page
 from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts import PARTS, load
-from gradient_routes.bench.lab.pool import Lane, Pool
+from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
 
 LOOPBACK = "127.0.0.1"
-QUICK = Lane(workers=2, timeout=20.0)
-LONG = Lane(workers=1, timeout=300.0, patience=10)
 UPLOAD = 20 * 2**20  # [byte] of one message of a page, files included
 IDLE = 60_000  # [ms] after which the session of a page that was closed ends
 

@@ -20,6 +20,8 @@ from gradient_routes.bench.lab.shell import Command, Row
 N = 8
 LN2 = float(np.log(2.0))
 OCTAVES = 2.0  # E from 1/4 to 4 of the start
+STRAINS = (r"\varepsilon_e(u)", r"\varepsilon_e(\lambda)")
+PRODUCT = (*(f"${strain}$" for strain in STRAINS), rf"$A\,L_e\,E_e\;{STRAINS[0]}\,{STRAINS[1]}$ [m<sup>2</sup>]")
 WORK = ("forward_solves", "solves", "transposed_solves")
 LINES = {
     "state": r"""<h2>1. A state for every p</h2><p>Moduli $p_e = \log E_e$ determine the displacements $u$ by
@@ -80,9 +82,10 @@ class Derivation(Part):
     def content(self) -> pn.Column:
         self._rows: dict[str, dict[str, Any]] = {}
         self._live = {name: pn.pane.HTML("", sizing_mode="stretch_width", min_height=60) for name in LINES}
-        self._bar = ColumnDataSource({"x": [], "u": [], "lam": []})
-        self._loads = ColumnDataSource({"x": [], "load": [], "tip": []})
-        self._elements = ColumnDataSource({"e": [], "g": []})
+        x = [(i + 1) / N for i in range(N)]
+        self._bar = ColumnDataSource({"x": [0.0, *x], "u": [0.0, *x], "lam": [0.0, *x]})
+        self._loads = ColumnDataSource({"x": x, "load": x})
+        self._elements = ColumnDataSource({"e": [e + 1 for e in range(N)], "g": x})
         figures = {"adjoint": self._adjoint_bar(), "product": self._products()}
         steps: list[pn.viewable.Viewable] = []
         for name, line in LINES.items():
@@ -109,12 +112,18 @@ class Derivation(Part):
         return pn.Column(pn.FlexBox(*sliders), pn.FlexBox(label, sensors, align_items="center"))
 
     def _adjoint_bar(self) -> pn.pane.Bokeh:
-        drawn = plot("x [L]", "displacement, scaled", title="u and lambda: one bar, two loads")
-        drawn.line("x", "u", source=self._bar, color=INK, line_width=2, legend_label="u [m]")
-        drawn.line("x", "lam", source=self._bar, color=colour("adjoint"), line_width=2, legend_label="lambda, scaled")
+        drawn = plot("x [L]", "u [m], others scaled", x_range=(0.0, 1.03))
+        drawn.line("x", "u", source=self._bar, color=INK, line_width=2, legend_label="u")
+        drawn.line("x", "lam", source=self._bar, color=colour("adjoint"), line_width=2, legend_label="λ")
         drawn.scatter("x", "lam", source=self._bar, color=colour("adjoint"), size=6)
-        drawn.vbar("x", 0.015, "load", source=self._loads, color=colour("fd-central"), legend_label="-J_u, scaled")
-        drawn.legend.location = "top_left"
+        drawn.vbar(
+            "x",
+            0.015,
+            "load",
+            source=self._loads,
+            color=colour("fd-central"),
+            legend_label="loads d - S u",
+        )
         return pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
 
     def _products(self) -> pn.pane.Bokeh:
@@ -129,28 +138,28 @@ class Derivation(Part):
             self._draw(message)
 
     def _draw(self, a: Algebra) -> None:
-        elements, nodes = [str(e + 1) for e in range(N)], [str(i + 1) for i in range(N)]
+        nodes = elements = [str(i + 1) for i in range(N)]
         at_sensors = [f"node {i}" for i in a.sensors]
         forward, reverse = (self._rows[name] for name in ("tangent", "adjoint"))
         live = {
-            "state": vector("node", a.u, nodes, "u, m") + f"<p>|R| = {number(float(np.linalg.norm(a.R)))} N</p>",
+            "state": vector("node", a.u, nodes, "$u$ [m]") + f"<p>$|R|$ = {number(float(np.linalg.norm(a.R)))} N</p>",
             "objective": table(
-                ["sensor", "S u [m]", "d [m]", "S u - d [m]"],
+                ["sensor", "$S u$ [m]", "$d$ [m]", "$S u - d$ [m]"],
                 [[i, *map(number, row)] for i, *row in zip(at_sensors, a.S_u, a.d, a.S_u - a.d, strict=True)],
             )
-            + f"<p>J = {number(a.J)} m<sup>2</sup></p>",
-            "chain": matrix("R_u [N/m], n_u x n_u", a.R_u) + matrix("R_p [N], n_u x n_p", a.R_p),
-            "sensitivity": matrix("du/dp [m], n_u x n_p", a.du_dp),
+            + f"<p>$J$ = {number(a.J)} m<sup>2</sup></p>",
+            "chain": f'<div class="row">{matrix("$R_u$ [N/m]", a.R_u)}{matrix("$R_p$ [N]", a.R_p)}</div>',
+            "sensitivity": matrix(r"$du/dp$ [m]", a.du_dp),
             "parentheses": table(
-                ["route", "forward solves", "linearized solves", "transposed solves", "dJ/dp_1 [m2]"],
+                ["route", "forward solves", "linearized solves", "transposed solves", "$dJ/dp_1$ [m<sup>2</sup>]"],
                 [
                     [row["route"], *(str(row["work"][k]) for k in WORK), number(row["gradient"][0], 6)]
                     for row in (forward, reverse)
                 ],
             ),
-            "adjoint": vector("node", a.lam, nodes, "lambda"),
+            "adjoint": vector("node", a.lam, nodes, "$\\lambda$"),
             "product": table(
-                ["element", "E [Pa]", "strain of u", "strain of lambda", "A L_e E product [m2]", "routes run"],
+                ["element", "$E_e$ [Pa]", *PRODUCT, "<code>routes run</code>"],
                 [
                     [e, *map(number, row), number(g, 6)]
                     for e, *row, g in zip(
@@ -161,10 +170,9 @@ class Derivation(Part):
             ),
         }  # fmt: skip
         for name, text in live.items():
-            self._live[name].object = text
-        x = [(i + 1) / N for i in range(N)]
-        scale, load = np.abs(a.u).max(initial=0.0), -a.J_u
-        lam, pushed = (v * scale / (np.abs(v).max(initial=0.0) or 1.0) for v in (a.lam, load))
-        self._bar.data = {"x": [0.0, *x], "u": [0.0, *a.u], "lam": [0.0, *lam]}
-        self._loads.data = {"x": x, "load": pushed}
-        self._elements.data = {"e": [e + 1 for e in range(N)], "g": reverse["gradient"]}
+            self._live[name].object = with_formulas(text)
+        scale, at = np.abs(a.u).max(initial=0.0), a.sensors - 1
+        lam, loads = (v * scale / (np.abs(v).max(initial=0.0) or 1.0) for v in (a.lam, -a.J_u))
+        self._bar.data = {"x": self._bar.data["x"], "u": [0.0, *a.u], "lam": [0.0, *lam]}
+        self._loads.data = {"x": a.sensors / N, "load": loads[at]}
+        self._elements.data = {"e": self._elements.data["e"], "g": reverse["gradient"]}

@@ -1,0 +1,73 @@
+"""The parts of the laboratory in the cells of a notebook; `routes lab` has them as pages. Needs gradient-routes[lab].
+
+    import gradient_routes.lab
+    gradient_routes.lab.bar()
+
+Options are those of a part's URL: bar(sensors="1,3,5", noise="0.001"). What is shown is computed in processes apart,
+which end with the notebook.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import atexit
+import tempfile
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gradient_routes.problems.errors import InputError
+
+if TYPE_CHECKING:
+    import panel as pn
+
+    from gradient_routes.bench.lab.part import Place
+
+__all__ = ["bar", "derivation"]
+
+
+def bar(**state: str) -> pn.Column:
+    """Moduli of a bar from displacements, by gradients: sensors, noise, regularization, optimizers, a stop.
+
+    Raises InputError where there is no notebook, or the extra is not installed.
+    """
+    return shown("inverter", state)
+
+
+def derivation(**state: str) -> pn.Column:
+    """The discrete adjoint, step by step, with the numbers of a bar. Raises InputError, as `bar`."""
+    return shown("derivation", state)
+
+
+def shown(slug: str, state: dict[str, str]) -> pn.Column:
+    """A part by the last word of its URL."""
+    try:
+        import panel as pn
+
+        from gradient_routes.bench.lab.page import inside
+        from gradient_routes.bench.lab.parts import load
+    except ModuleNotFoundError as missing:
+        raise InputError(f"lab: {missing.name} is not installed - pip install 'gradient-routes[lab]'") from missing
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        raise InputError("lab: this is no notebook - see the pages of `routes lab`") from None
+    pn.extension(inline=True)  # no network
+    part = load(slug)(_place(), state)
+    column = inside(part)
+    part.pushed = partial(pn.io.push_notebook, column)
+    part.start()
+    return column
+
+
+@cache
+def _place() -> Place:
+    """One for the whole notebook."""
+    from gradient_routes.bench.lab.part import Place
+    from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
+
+    pools = Pool(QUICK), Pool(LONG)
+    for pool in pools:
+        pool.warm()
+        atexit.register(pool.close)
+    return Place(*pools, Path(tempfile.mkdtemp(prefix="routes-lab-")))
