@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from gradient_routes.bench.commands.advise import advise
 from gradient_routes.bench.commands.compare import baseline, compare
 from gradient_routes.bench.commands.completion import with_completion
 from gradient_routes.bench.commands.environments import environments
@@ -18,7 +19,9 @@ from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
 from gradient_routes.bench.studies.command import commands_of_studies
 
-OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline, environments, serve, lab]
+OTHERS: list[click.Command] = [
+    *(advise, list_, status, report, export, merge, compare, baseline, environments, serve, lab),
+]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
 
