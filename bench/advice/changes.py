@@ -14,7 +14,7 @@ from gradient_routes.problems.problem import Offers
 Best = Callable[[Answers], Bill | None]
 Other = Callable[[float], Bill | None]
 Bound = Literal["at most", "at least", "with", "without"]
-GROWTH = 4.0  # from one value that is tried to the next
+GROWTH = 8.0  # from one value that is tried to the next
 CLOSE = 1.01  # of the ends of an interval that holds a threshold, for numbers that are not whole
 
 

@@ -93,7 +93,7 @@ GLOSSARY = (
         "inverse crime",
         "To invert synthetic data with the very model that made them. The result is better than any that measured data"
         " will give.",
-        "how-to/invert.md",
+        "how-to/use-your-mesh-and-data.md",
         ("Colton & Kress 2019", "Kaipio & Somersalo 2005"),
     ),
     Term(

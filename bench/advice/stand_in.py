@@ -50,8 +50,8 @@ def problem(answers: Answers) -> Problem:
 
 
 def model(answers: Answers) -> Model:
-    """The same with the tolerance that forward work is declared for."""
-    return Model(problem(answers), Solver(rtol=prices(answers).declared.rtol))
+    """The same with the tolerance that forward work is declared for; its linear solver solves nothing."""
+    return Model(problem(answers), Solver(rtol=prices(answers).declared.rtol, linear_solver="superlu"))
 
 
 def prices(answers: Answers) -> Prices:
