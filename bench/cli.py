@@ -32,6 +32,7 @@ def main() -> None:
 
     \b
     routes list                                  problems and routes, all options
+    routes advise --parameters 5000              which route to take, and why
     routes run --problem bar --route adjoint     one gradient, its cost and error
     routes run --problem 'bar[n=8|64]' --route all
     routes vcurve --problem bar --route adjoint  a verdict, by finite differences

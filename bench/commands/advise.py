@@ -12,7 +12,7 @@ import click
 
 from gradient_routes.bench.command_options import at_option, debug_option, refuse_given
 from gradient_routes.bench.commands.group import FAILED
-from gradient_routes.bench.ranges import FRACTION, MANY, SECONDS, Real, Whole
+from gradient_routes.bench.ranges import FRACTION, MANY, SECONDS, Real
 from gradient_routes.bench.sanitize import echo
 from gradient_routes.bench.studies.options import problem_option
 
@@ -41,7 +41,7 @@ ERROR = "Relative error that the gradient may have."
 @click.option(
     "--unknowns", type=MANY, default=100_000, show_default=True, metavar="N", help="n_u, of one step in time."
 )
-@click.option("--steps", type=Whole(0, 10**9), default=0, show_default=True, metavar="T", help="In time; 0: steady.")
+@click.option("--steps", type=MANY, metavar="T", help="Steps in time. [a steady problem]")
 @click.option(
     "--newton-steps", type=MANY, default=1, show_default=True, metavar="K", help="Of a solve; 1: R is linear."
 )
@@ -64,7 +64,7 @@ def advise(
     parameters: int,
     outputs: int,
     unknowns: int,
-    steps: int,
+    steps: int | None,
     newton_steps: int,
     have: tuple[str, ...],
     kinks: bool,
@@ -120,7 +120,7 @@ def advise(
         answers = Answers(
             n_p=parameters,
             n_u=unknowns,
-            steps=steps,
+            steps=steps or 0,
             newton=newton_steps,
             offers=offers if offers == Offers.VALUE else offers | Offers.SOLVE,
             smooth=not kinks,

@@ -90,7 +90,7 @@ def test_where_no_route_is_possible_it_says_what_would_help(cli) -> None:
         ("--memory much", "--memory much - give a size from 64MiB on, 4GiB say, or none"),
         ("--forward inf", "--forward inf - give seconds > 0 and <= 1e+12"),
         ("--budget -1", "--budget -1 - give seconds > 0, or inf"),
-        ("--steps 1.5", "--steps 1.5 - give a whole number from 0 to 1000000000"),
+        ("--steps 1.5", "--steps 1.5 - give a whole number from 1 to 1000000000"),
         ("--have everything", "'everything' is not one of"),
         ("--problem bar --steps 3", "--steps: is told by --problem - leave it out"),
         ("--problem bar --kinks", "--kinks: is told by --problem - leave it out"),
