@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from gradient_routes.bench.commands.advise import advise
 from gradient_routes.bench.commands.compare import baseline, compare
 from gradient_routes.bench.commands.completion import with_completion
 from gradient_routes.bench.commands.environments import environments
@@ -18,7 +19,9 @@ from gradient_routes.bench.commands.status import status
 from gradient_routes.bench.commands.version import print_version
 from gradient_routes.bench.studies.command import commands_of_studies
 
-OTHERS: list[click.Command] = [list_, status, report, export, merge, compare, baseline, environments, serve, lab]
+OTHERS: list[click.Command] = [
+    *(advise, list_, status, report, export, merge, compare, baseline, environments, serve, lab),
+]
 VERSION = "Show the version, the commit of a checkout and the version of Python."
 
 
@@ -29,6 +32,7 @@ def main() -> None:
 
     \b
     routes list                                  problems and routes, all options
+    routes advise --parameters 5000              which route to take, and why
     routes run --problem bar --route adjoint     one gradient, its cost and error
     routes run --problem 'bar[n=8|64]' --route all
     routes vcurve --problem bar --route adjoint  a verdict, by finite differences

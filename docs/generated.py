@@ -16,6 +16,8 @@ from typing import Any, get_args
 import click
 
 import gradient_routes
+from gradient_routes.bench.advice.glossary import GLOSSARY
+from gradient_routes.bench.advice.literature import SOURCES
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.options import options_of
 from gradient_routes.bench.cli import main
@@ -38,6 +40,7 @@ def pages() -> dict[str, str]:
         "verdicts.md": verdicts(),
         "tables.md": tables(),
         "python.md": python(),
+        "glossary.md": glossary(),
     }
 
 
@@ -129,6 +132,17 @@ def tables(title: str = "Tables and columns") -> str:
         for name, cs in schema.tables().items()
     ]
     return "\n".join([f"# {title}\n", head, *body])
+
+
+def glossary() -> str:
+    """Every term, with its page and its sources, and the literature that is cited."""
+    terms = []
+    for term in GLOSSARY:
+        links = [f"[more](../{term.page})", *(f"[{key}]({SOURCES[key].link})" for key in term.sources)]
+        terms.append(f"**{plain(term.name)}**: {plain(term.meaning)} ({', '.join(links)})\n")
+    sources = [f"- **{key}**: {plain(source.text)} <{source.link}>" for key, source in sorted(SOURCES.items())]
+    head = "The words of these pages, and the literature behind what `routes advise` says.\n"
+    return "\n".join(["# Glossary\n", head, *terms, "## Literature\n", *sources, ""])
 
 
 def python() -> str:

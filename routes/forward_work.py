@@ -67,7 +67,8 @@ class ForwardWork:
         if self.newton == "inexact" and (iterated := self._iterated(1 + times, cold=1)):
             return iterated
         each = 1 if self.linear else max(1, math.ceil(math.log2(self._decades(h))))
-        return self.polished() + Work(forward_solves=times, residuals=times) + self._newton(self._near(times * each))
+        solves = Work(forward_solves=times, residuals=times, steps=times * self.cold.steps)
+        return self.polished() + solves + self._newton(self._near(times * each))
 
     def chord(self, times: int, h: float) -> Work:
         """The same on the factors of the first: every step multiplies |R| by about h."""
@@ -76,7 +77,7 @@ class ForwardWork:
         ):
             return iterated
         steps = self._near(times * max(1, math.ceil(self._decades(h)) - 1))
-        return self.polished() + Work(times, newton_iterations=steps, residuals=times + steps, solves=steps)
+        return self.polished() + Work(times, steps, times + steps, solves=steps, steps=times * self.cold.steps)
 
     def _iterated(self, solves: int, cold: int, directions: int | None = None) -> Work | None:
         """`solves` inexact ones, `cold` from scratch, R_u used by `directions` steps [all]; None if uncounted."""

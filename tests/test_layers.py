@@ -20,7 +20,19 @@ CONTRACT = {"problem", "transient", "rates", "errors", "text", "jax64", "program
 # packages of the bench from the lowest to the highest; files beside them are helpers, below, or the command line, above
 ORDER = (
     *("sanitize", "units", "ranges", "command_options", "cases", "store", "execution", "environments", "render"),
-    *("verification", "protocols", "inversion", "regression", "studies", "lab", "commands", "api", "cli", "start"),
+    *(
+        "advice",
+        "verification",
+        "protocols",
+        "inversion",
+        "regression",
+        "studies",
+        "lab",
+        "commands",
+        "api",
+        "cli",
+        "start",
+    ),
 )
 # the only modules that import JAX when they are imported; nothing imports those before it needs them
 TRACED = {

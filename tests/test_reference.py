@@ -96,5 +96,5 @@ def test_only_changed_pages_are_written(tmp_path) -> None:
     (tmp_path / "reference" / "routes.md").write_text("old")
     GENERATED["write"](tmp_path / "reference")
     after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "reference").iterdir()}
-    assert len(before) == 6
+    assert len(before) == 7
     assert {name for name in after if after[name] != before[name]} == {"routes.md"}

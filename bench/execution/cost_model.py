@@ -37,12 +37,23 @@ class Prices:
         A residual is taken to cost as much as a product. Chord steps reuse factors and count as substitutions.
         """
         cold = self.declared.cold
+        if cold.steps and not self.declared.linear and work.factorizations >= work.newton_iterations:
+            return self._marched(work)
         times = work.factorizations / cold.factorizations if cold.factorizations else work.forward_solves
         substitutions = work.solves + work.transposed_solves - times * cold.solves
         products = work.matvecs + work.residuals - times * (cold.matvecs + cold.residuals)
         again = work.steps / cold.steps - times if cold.steps else 0.0  # marches
         solves = times + max(0.0, again)
         return solves * self.forward.wall + max(0.0, substitutions) * self.solve + max(0.0, products) * self.matvec
+
+    def _marched(self, work: Work) -> float:
+        """By Newton's method in every step of time: a factorization beyond those of its steps is one in every step of
+        time, for a sweep; without it a transposed solve is that of one Newton step.
+        """
+        cold, sweeps = self.declared.cold, work.factorizations - work.newton_iterations
+        times = (work.newton_iterations + sweeps * cold.steps) / cold.newton_iterations
+        back = work.transposed_solves / (1 if sweeps else cold.steps)
+        return times * self.forward.wall + (work.solves - work.newton_iterations + back) * self.solve
 
 
 def prices(model: Model, p: Array) -> tuple[Prices, State | None]:

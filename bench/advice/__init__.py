@@ -1,0 +1,1 @@
+"""Which route to take: predicted bills, reasons, what would change the answer; the literature and a glossary."""
