@@ -114,10 +114,10 @@ def guides(figure: Figure) -> list[Spec]:
     ]
 
 
-def svg(figure: Figure, most: int = FIRST) -> str:
+def svg(figure: Figure) -> str:
     """The first panels on the first axes."""
     import vl_convert
 
-    first = set(list(dict.fromkeys(figure.panels or [""]))[:most])
+    first = set(list(dict.fromkeys(figure.panels or [""]))[:FIRST])
     rows = [row for row in records(figure) if row["_panel"] in first]
     return str(vl_convert.vegalite_to_svg(spec(figure) | {"datasets": {"rows": rows}}))

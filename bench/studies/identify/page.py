@@ -21,4 +21,4 @@ def fragment(one: Identified) -> str:
         tuple(figure for figure in drawn if figure is not None),
         notes=tuple(Note("", note) for note in notes),
     )
-    return notebook.shown("", "", first, section)
+    return notebook.shown(f"{one.spec.selector}:", "", first.removeprefix(f"{one.spec.selector}: "), section)
