@@ -13,7 +13,8 @@ from gradient_routes.bench.render.figure import Figure, Section, Table
 from gradient_routes.bench.render.html import badge, numbers_of, told
 from gradient_routes.bench.render.vega import overlaps, svg
 
-OPEN = 5  # rows of a table that is not folded
+OPEN = ("components",)  # tables that are not folded
+NAMES = {"problem", "route", "optimizer", "alpha", "run", "experiment", "at", "n_param"}
 MOST = 64  # rows of a table beside a picture
 UNSEEN = re.compile(r' (?:aria-[\w-]+|role|class|pointer-events)="[^"]*"')  # in a picture that has a text of its own
 LOOK = re.compile(r' ((?:fill|stroke|opacity|font|text-anchor)[\w-]*)="([^"]*)"')
@@ -45,7 +46,7 @@ def _figure(figure: Figure) -> str:
     rows = len(figure.table.rows)
     table = numbers_of(replace(figure, table=_telling(figure.table))) if not figure.mark or rows <= MOST else ""
     if not figure.mark:
-        opened = " open" if rows <= OPEN else ""
+        opened = " open" if figure.id in OPEN else ""
         says = f"<p class='soft'>{escape(figure.says)}</p>" if figure.says else ""
         return f"<details{opened}><summary>{escape(figure.title)}</summary>{table}{says}</details>"
     caption = f"<figcaption><b>{escape(figure.title)}.</b> {escape(figure.says + overlaps(figure) + part)}</figcaption>"
@@ -89,10 +90,10 @@ def _small(svg: str) -> str:
 
 
 def _telling(table: Table) -> Table:
-    """Without texts that are the same in every row."""
+    """Without names that are the same in every row."""
     kept = [
         k
         for k, column in enumerate(table.columns)
-        if column.type != "TEXT" or len(table.rows) < 2 or len(set(table.column(column.name))) > 1
+        if column.name not in NAMES or len(set(table.column(column.name))) > 1
     ]
     return Table(tuple(table.columns[k] for k in kept), tuple(tuple(row[k] for k in kept) for row in table.rows))
