@@ -72,6 +72,12 @@ class Inversion:
     fit: Fit | None = field(default=None, repr=False)
     regime: LinearRegime | None = field(default=None, repr=False)
 
+    def _repr_html_(self) -> str:
+        """In a notebook."""
+        from gradient_routes.bench.inversion import page
+
+        return page.fragment(self)
+
     @property
     def misled(self) -> bool:
         """Whether the gradient has turned out not to be that of J."""

@@ -88,14 +88,14 @@ def _section(section: Section, labels: dict[str, str]) -> str:
 
 
 def _figure(figure: Figure, place: int, label: str) -> str:
-    numbers = _table(figure)
+    numbers = numbers_of(figure)
     if figure.mark:
         numbers = f"<details><summary>Numbers</summary><noscript>{numbers}</noscript></details>"
     return (
         f"<figure id='{figure.id}' data-figure='{place}'><figcaption><h3><span>{label}</span> {escape(figure.title)}"
         f"</h3>{f'<p>{escape(figure.says + overlaps(figure))}</p>' if figure.says else ''}</figcaption>"
         f"<div class='tools' hidden>{_tools(figure)}</div>"
-        f"{'<div class=plot></div>' if figure.mark else ''}{_told(figure)}<div class='numbers'>{numbers}</div></figure>"
+        f"{'<div class=plot></div>' if figure.mark else ''}{told(figure)}<div class='numbers'>{numbers}</div></figure>"
     )
 
 
@@ -110,11 +110,11 @@ def _tools(figure: Figure) -> str:
     return f"{made}<button type='button' data-do='csv'>CSV</button>"
 
 
-def _told(figure: Figure) -> str:
+def told(figure: Figure) -> str:
     """What is said of each panel, the verdict first."""
     shown = [name for name in dict.fromkeys(figure.panels) if name in figure.told]
     items = [
-        f"<li><b>{escape(name)}</b> {_verdict(figure.told[name].verdict)} {escape(figure.told[name].says)}</li>"
+        f"<li><b>{escape(name)}</b> {badge(figure.told[name].verdict)} {escape(figure.told[name].says)}</li>"
         for name in shown
         if figure.told[name].verdict or figure.told[name].says
     ]
@@ -123,7 +123,7 @@ def _told(figure: Figure) -> str:
     return f"<details><summary>What is said of {len(items)} panels</summary><ul>{''.join(items)}</ul></details>"
 
 
-def _verdict(word: str) -> str:
+def badge(word: str) -> str:
     kind = "good" if word == "agrees" else "bad" if word.startswith(("wrong", "incons")) else "unsure"
     return f"<span class='verdict {kind}'>{escape(word)}</span>" if word else ""
 
@@ -137,7 +137,7 @@ def _note(note: Note) -> str:
     return f"<details class='note' {data}><summary>{summary}</summary>{words}</details>"
 
 
-def _table(figure: Figure) -> str:
+def numbers_of(figure: Figure) -> str:
     table = figure.table
     columns = [(k, table.columns[k], " class=t" if table.columns[k].type == "TEXT" else "") for k in table.known]
     head = "".join(
@@ -146,7 +146,7 @@ def _table(figure: Figure) -> str:
     )
 
     def cell(row: tuple[Any, ...], k: int, column: Any, kind: str) -> str:
-        words = _verdict(row[k] or "") if column.name == "verdict" else escape(shown(column, row[k]))
+        words = badge(row[k] or "") if column.name == "verdict" else escape(shown(column, row[k]))
         return f"<td{kind}>{words}"
 
     body = "".join(f"<tr>{''.join(cell(row, *column) for column in columns)}" for row in table.rows[:ROWS])

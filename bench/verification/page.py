@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gradient_routes.bench.cases.column import Column
-from gradient_routes.bench.render import html
+from gradient_routes.bench.render import html, notebook
 from gradient_routes.bench.render.figure import Axis, Figure, Note, Section, Table
 from gradient_routes.bench.render.picking import real, text
 from gradient_routes.bench.render.style import DASHES, GREY, Style, of_route
@@ -54,6 +54,11 @@ FINDINGS = (
 def page(check: Check) -> str:
     """The whole page as text."""
     return html.page(f"{check.name}: {check.verdict}", check.says, [section(check)])
+
+
+def fragment(check: Check) -> str:
+    """What a notebook shows."""
+    return notebook.shown(check.name, check.verdict, check.says, section(check))
 
 
 def section(check: Check) -> Section:

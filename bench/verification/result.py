@@ -144,6 +144,15 @@ class Check:
     def __str__(self) -> str:
         return f"{self.name}: {self.verdict}: {self.says} - {self.todo}"
 
+    def __repr__(self) -> str:
+        return f"<Check {self}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook."""
+        from gradient_routes.bench.verification import page
+
+        return page.fragment(self)
+
     @property
     def proof(self) -> Finding | None:
         """The first finding that proves a part of the gradient wrong."""

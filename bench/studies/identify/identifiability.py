@@ -59,6 +59,15 @@ class Identified:
     prior_sd: Array | None
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"<Identified {self.spec.selector}: {self.rank} of {len(self.state.p)} directions>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook."""
+        from gradient_routes.bench.studies.identify import page
+
+        return page.fragment(self)
+
     @property
     def natural(self) -> Array:
         """Changes of p, (n_p,)."""

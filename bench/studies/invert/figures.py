@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gradient_routes.bench.cases.column import Row
-from gradient_routes.bench.render.figure import Axis, Figure, Guide, Section
+from gradient_routes.bench.inversion import estimates_figures as estimates
+from gradient_routes.bench.inversion.history_figure import RUN, history, named
+from gradient_routes.bench.render.figure import Figure, Section
 from gradient_routes.bench.render.format import number
-from gradient_routes.bench.render.picking import each, grouped, real, tabulate, text
+from gradient_routes.bench.render.picking import grouped, real, tabulate, text
 from gradient_routes.bench.render.source import Source
-from gradient_routes.bench.studies.invert import estimates_figures as estimates
 from gradient_routes.bench.studies.invert import regularization_figures as regularization
 from gradient_routes.bench.studies.invert import residuals_figures as residuals
 
 CLOSE = 1.1  # times the least misfit that a run on the problem ended with: arrived
 REACHED = (
-    text("run", "route and optimizer"),
+    RUN,
     real("aim", "problem's", f"misfit to reach: {CLOSE:g} times the least of any run on the problem"),
     real("iterations", "1", "steps until there; absent where it never was"),
     real("solves", "1", "forward solves until there"),
@@ -38,55 +39,13 @@ def section(source: Source) -> Section | None:
         *residuals.fits(met),
         *residuals.figures(missed),
     )
-    figures = (history(rows), reached(rows), *fields, *regularization.figures(source))
+    figures = (history(rows, paid_and_met(rows)), reached(rows), *fields, *regularization.figures(source))
     drawn = tuple(f for f in figures if f is not None)
     says = "From gradients to parameters: the misfit step by step, what was found, how much to regularize."
     return Section("inversion", "Inversion", says, drawn) if drawn else None
 
 
-def named(row: Row) -> str:
-    """Route, optimizer, and the weight where the problem's name does not tell it."""
-    alpha = f", alpha = {row['alpha']:g}" if row["alpha"] and "alpha=" not in row["problem"] else ""
-    return f"{row['route']}, {row['optimizer']}{alpha}"
-
-
-def history(rows: Sequence[Row]) -> Figure | None:
-    if not rows:
-        return None
-    columns = "problem route optimizer alpha run iteration objective misfit regularization gradient_norm step_length"
-    return Figure(
-        "history",
-        "Misfit, step by step",
-        says(rows),
-        tabulate(
-            "inversion",
-            rows,
-            f"{columns} forward_solves adjoint_solves seconds distance discrepancy chosen says",
-            REACHED[:1],
-        ),
-        "line",
-        x=(
-            Axis("iteration", "iteration"),
-            Axis("forward_solves", "forward solves"),
-            Axis("adjoint_solves", "linearized and adjoint solves"),
-            Axis("seconds", "time", "s"),
-        ),
-        y=(
-            Axis("misfit", "misfit ½|Su − d|²", "unit of J", scale="log"),
-            Axis("objective", "J", "unit of J", scale="log"),
-            Axis("gradient_norm", "|dJ/dp|", "unit of J / p", scale="log"),
-            Axis("distance", "distance to the truth, relative", scale="log"),
-            Axis("discrepancy", "misfit against noise |Su − d| / (σ√m)", scale="log"),
-        ),
-        series=each(rows, "run"),
-        panels=each(rows, "problem"),
-        routes=True,
-        guides=(Guide("y", 1.0, "noise", column="discrepancy"),),
-        note="chosen",
-    )
-
-
-def says(rows: Sequence[Row]) -> str:
+def paid_and_met(rows: Sequence[Row]) -> str:
     met = [
         f"{row['run']} meets the data to their noise at iteration {row['iteration']}." for row in rows if row["chosen"]
     ]
