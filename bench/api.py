@@ -182,7 +182,7 @@ def invert(
 
     optimizer   "lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent" or "adam"; "linear": one linear
                 solve, exact where u is linear in p
-    iterations  at most
+    iterations  at most; 0: the start
     tolerance   ends where |dJ/dp|, per natural change of p, is so much of its first, or of 1/2 |d|^2 (stiffness, rod)
     positive    "log" or "softplus": what keeps a raw parameter > 0
     rate        of adam's steps, in natural changes of p
@@ -207,9 +207,9 @@ def invert(
 
     _choice("invert: optimizer", optimizer, Name)
     _choice("invert: positive", positive, Positive)
-    if iterations < 1 or not 0.0 <= tolerance < 1.0 or not 0.0 < rate < float("inf"):
+    if iterations < 0 or not 0.0 <= tolerance < 1.0 or not 0.0 < rate < float("inf"):
         raise InputError(
-            f"invert: iterations={iterations}, tolerance={tolerance:g}, rate={rate:g} - give at least one iteration, a"
+            f"invert: iterations={iterations}, tolerance={tolerance:g}, rate={rate:g} - give iterations >= 0, a"
             " tolerance below 1 and a rate > 0"
         )
     engine = Engine(optimizer, Limits(iterations, tolerance, rate, stop_at_noise), solver_of(**solver), positive)

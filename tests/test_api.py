@@ -175,7 +175,7 @@ def test_solver_options_reach_the_solver() -> None:
         (lambda: vcurve("bar", rtol=2.0), "give 0 < rtol < 1"),
         (lambda: invert("bar", optimizer="lbfg"), "did you mean 'lbfgs'?"),
         (lambda: invert("bar", positive="lg"), "did you mean 'log'?"),
-        (lambda: invert("bar", iterations=0), "iterations=0, tolerance=1e-09, rate=0.1 - give at least one iteration"),
+        (lambda: invert("bar", iterations=-1), "iterations=-1, tolerance=1e-09, rate=0.1 - give iterations >= 0"),
         (lambda: invert("bar", tolerance=1.0), "a tolerance below 1"),
         (lambda: invert("bar", rate=float("nan")), "a rate > 0"),
         (lambda: invert("bar", linear_solver="lu"), "--linear-solver lu - "),

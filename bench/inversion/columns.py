@@ -41,6 +41,7 @@ ESTIMATES = (
     Column("truth", "REAL", "its own", "p behind synthetic data"),
     Column("gradient", "REAL", "problem's", "dJ/dp at the end"),
     Column("blind", "INTEGER", "1", "1 where no datum depends on it"),
+    Column("view", "TEXT", "", "what its problem shows beside it at the end: of the bar E and the strains", json=True),
 )
 
 LCURVE = (
@@ -62,6 +63,8 @@ TRADEOFF = (
     Column("bias", "REAL", "1", "|mean p - p_true|^2 / n_p, over the draws"),
     Column("variance", "REAL", "1", "mean |p - mean p|^2 / n_p"),
     Column("total", "REAL", "1", "their sum: mean |p - p_true|^2 / n_p"),
+    Column("mean", "TEXT", "its own", "mean p, over the draws, parameter by parameter", json=True),
+    Column("sd", "TEXT", "its own", "sqrt(mean (p - mean p)^2), likewise", json=True),
 )
 
 FIT = (

@@ -27,12 +27,14 @@ from gradient_routes.bench.inversion.optimizers import (
     converged,
     flat,
     optimizer,
+    spent,
     stopped_at_noise,
 )
 from gradient_routes.bench.inversion.result import Inversion, Stop
 from gradient_routes.bench.inversion.variables import Positive, Variables
 from gradient_routes.problems.errors import OUTSIDE, RoutesError
 from gradient_routes.problems.problem import Array, Offers, ParameterView, Problem
+from gradient_routes.routes.linearized_solve import LinearizedSolver
 from gradient_routes.routes.measured_start import fitted_factor, small_strain_factor
 from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
@@ -40,6 +42,7 @@ from gradient_routes.routes.sensitivity import Sensitivity
 
 __all__ = ["Engine", "Inversion", "invert"]
 
+BY_DATA = ("gauss-newton", "levenberg-marquardt", "trust")  # optimizers whose gradient is H^T r
 FAR = 10.0  # times too soft or too stiff: a start from which an optimizer of size one has far to go
 
 
@@ -97,6 +100,8 @@ def invert(
                 end = "converged: dJ/dp is 0 at the start"
             elif run is None and flat(objective, found, engine.limits):
                 end = converged(objective, engine.limits)
+            elif engine.limits.iterations == 0:
+                end = spent(engine.limits)
             else:
                 end = (run or optimizer(engine.optimizer))(objective, history, engine.limits)
         except Stopped as ended:
@@ -117,7 +122,7 @@ def invert(
     last, ending = history.last, objective.forward_solves - history.iterates[-1].forward_solves
     assert last is not None
     try:
-        shown = view(problem, last, engine.solver, complete=not interrupted)
+        shown = view(problem, last, engine.solver, not interrupted, engine.optimizer in BY_DATA)
     except KeyboardInterrupt:  # the result does not depend on the view
         shown, interrupted = ParameterView(), True
     return Inversion(
@@ -182,21 +187,26 @@ def checked_by(spec: ProblemSpec, route: RouteSpec, at: str) -> str:
     return shlex.join(words if at == "start" else [*words, "--at", at])
 
 
-def view(problem: Problem, found: Evaluation, solver: Solver, complete: bool = True) -> ParameterView:
+def view(
+    problem: Problem, found: Evaluation, solver: Solver, complete: bool = True, adjoint: bool = False
+) -> ParameterView:
     """What the problem shows beside the gradient at the end (for the bar, its strains) and the blind parameters.
 
     A route that returns no state, such as finite differences, costs one forward solve here, and a problem that does
-    not know its blind parameters one factorization and few linearized solves; none of them is counted. Without
-    `complete` only what needs no solve is shown.
+    not know its blind parameters one factorization and few linearized solves, an `adjoint` that the optimizer has not
+    one of each; none of them is counted. Without `complete` only what needs no solve is shown.
     """
     if Offers.SOLVE not in problem.offers or (found.u is None and not complete):
         return ParameterView()
-    model, u = Model(problem, solver), found.u
+    model, u, lam = Model(problem, solver), found.u, found.lam
     try:
         u = model.solve(found.p).u if u is None else u
+        if adjoint and lam is None and complete and Offers.LINEARIZE in problem.offers:
+            state = model.state_at(u, found.p)
+            lam = LinearizedSolver(model, state, "fresh").solve_transposed(-model.linearize(state).J_u)
     except OUTSIDE:  # a solve from scratch may fail where the route arrived by small steps
         return ParameterView()
-    shown = problem.view(found.p, u, found.lam)
+    shown = problem.view(found.p, u, lam)
     seen = problem.observation(u, found.p)
     if shown.blind is not None or not complete or seen is None or not len(seen.data):
         return shown

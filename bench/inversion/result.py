@@ -129,4 +129,5 @@ class Inversion:
             "truth": None if self.truth is None else self.truth[i],
             "gradient": self.gradient[i],
             "blind": None if self.view.blind is None else int(self.view.blind[i]),
+            "view": {name: float(column[i]) for name, column in self.view.columns.items()},
         }

@@ -18,17 +18,21 @@ from gradient_routes.routes.synthetic_data import CONVERGED
 
 @dataclass(frozen=True)
 class Trade:
-    """Mean squares over the parameters, of several draws of the noise at one alpha: total = bias + variance."""
+    """Of several draws of the noise at one alpha: mean and standard deviation of p (n_p,), and mean squares over
+    the parameters, total = bias + variance.
+    """
 
     inversion: Inversion
     draws: int
     bias: float
     variance: float
+    mean: Array
+    sd: Array
 
     @property
     def row(self) -> Row:
         own = {"draws": self.draws, "bias": self.bias, "variance": self.variance, "total": self.bias + self.variance}
-        return self.inversion.shared | own
+        return self.inversion.shared | own | {"mean": self.mean.tolist(), "sd": self.sd.tolist()}
 
 
 def trade_off(
@@ -56,7 +60,8 @@ def _trade(found: Sequence[Inversion]) -> Trade:
     p, truth = np.array([each.p for each in found]), found[0].truth
     assert truth is not None
     mean, shown = p.mean(axis=0), next((each for each in found if each.misled), found[0])
-    return Trade(shown, len(found), float(np.mean((mean - truth) ** 2)), float(np.mean((p - mean) ** 2)))
+    bias, variance = float(np.mean((mean - truth) ** 2)), float(np.mean((p - mean) ** 2))
+    return Trade(shown, len(found), bias, variance, mean, p.std(axis=0))
 
 
 def drawn(spec: ProblemSpec, draws: int) -> list[Problem]:

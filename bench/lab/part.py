@@ -77,6 +77,10 @@ class Part(param.Parameterized):
         """What is computed: that command, unless a part needs more than its rows."""
         return Command(self.command(), self.place.folder)
 
+    def pool(self) -> Pool:
+        """Where it is computed."""
+        return self.place.quick if self.at_once else self.place.long
+
     def content(self) -> pn.viewable.Viewable:
         """What is seen. Asked for once."""
         raise NotImplementedError
@@ -146,7 +150,7 @@ class Part(param.Parameterized):
     def start(self) -> None:
         """Compute the newest state, now or when what runs has ended."""
         self._moves += 1
-        if self._following is None or self._following.done():
+        if not self.running:
             self._following = asyncio.get_running_loop().create_task(self._follow())
 
     def stop(self) -> None:
@@ -156,8 +160,9 @@ class Part(param.Parameterized):
 
     @property
     def running(self) -> bool:
-        """Whether a command runs, or waits for a process."""
-        return self._following is not None and not self._following.done()
+        """Whether a command runs, or waits for a process, and is not to stop."""
+        following = self._following
+        return following is not None and not following.done() and not following.cancelling()
 
     async def _follow(self) -> None:
         """Run the command of the state until it is that of the newest one."""
@@ -175,9 +180,8 @@ class Part(param.Parameterized):
         said: list[str] = []
         code = 0
         self._later(self.begin)
-        pool = self.place.quick if self.at_once else self.place.long
         try:
-            async with aclosing(pool.messages(job)) as messages:
+            async with aclosing(self.pool().messages(job)) as messages:
                 async for message in messages:
                     match message:
                         case Said(text):
@@ -189,7 +193,8 @@ class Part(param.Parameterized):
                         case _:
                             self._later(self.take, message)
         except asyncio.CancelledError:
-            self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
+            if self._following is asyncio.current_task():  # else a newer one has begun
+                self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
             raise
 
     def _ended(self, end: Ended, code: int, said: list[str]) -> None:

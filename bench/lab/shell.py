@@ -72,6 +72,21 @@ class Command:
         channel.say(Exited(code or 0))
 
 
+@dataclass(frozen=True)
+class Commands:
+    """One after the other; the exit code is that of the last."""
+
+    commands: tuple[Command, ...]
+
+    @property
+    def name(self) -> str:
+        return self.commands[-1].name
+
+    def __call__(self, channel: Channel) -> None:
+        for command in self.commands:
+            command(channel)
+
+
 class Lines(io.TextIOBase):
     """A text stream that hands on whole lines."""
 

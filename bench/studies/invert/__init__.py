@@ -14,6 +14,7 @@ from gradient_routes.bench.inversion.columns import CONSTANTS, ESTIMATES, FIT, I
 from gradient_routes.bench.ranges import COUNT, FROM_ZERO, POSITIVE, SEED, Whole
 from gradient_routes.bench.studies.options import problem_option
 
+FROM_NONE = Whole(0)
 POSITIVES = ["none", "log", "softplus"]
 OPTIMIZERS = ["lbfgs", "gauss-newton", "levenberg-marquardt", "trust", "descent", "adam"]
 OPTIMIZER = "gauss-newton, levenberg-marquardt and trust use d(S u)/dp; descent is for comparison, adam for --minibatch"
@@ -62,7 +63,7 @@ STUDY = Study(
         routes_option("adjoint"),
         at_option,
         click.option("--optimizer", type=click.Choice(OPTIMIZERS), default="lbfgs", show_default=True, help=OPTIMIZER),
-        click.option("--iterations", type=COUNT, default=200, show_default=True, help="At most."),
+        click.option("--iterations", type=FROM_NONE, default=200, show_default=True, help="At most; 0: the start."),
         click.option("--tolerance", type=FROM_ZERO, default=1e-9, show_default=True, help=TOLERANCE),
         click.option(
             "--positive",

@@ -22,7 +22,7 @@ from gradient_routes.bench.inversion.objective import noise_level
 from gradient_routes.bench.inversion.one_shot import OneShot, of_problem
 from gradient_routes.bench.inversion.optimizers import Limits, Name, check_noise
 from gradient_routes.bench.inversion.resumed import last_estimate
-from gradient_routes.bench.inversion.tradeoff import trade_off
+from gradient_routes.bench.inversion.tradeoff import Trade, trade_off
 from gradient_routes.bench.inversion.variables import Positive, Variables
 from gradient_routes.bench.store.output_files import read_by
 from gradient_routes.bench.studies.invert import answer_files
@@ -154,9 +154,8 @@ class Run:
                 f"--alpha-sweep {given[0]:.10g} {given[1]:.10g}: are the same to six digits - go further apart"
             )
         if draws is not None:
-            trades = self._until_it_ends(trade_off(self.spec, route, self.engine, alphas, draws, self.at))
+            trades = self._until_it_ends(self._traded(trade_off(self.spec, route, self.engine, alphas, draws, self.at)))
             self._judge([trade.inversion for trade in trades])
-            self._keep("tradeoff", [trade.row for trade in trades])
             self.say(Found(Trades(trades)))
             return
         swept = self._until_it_ends(self._swept(minima(self.spec, route, self.engine, alphas, self.at)))
@@ -174,6 +173,11 @@ class Run:
         for table, rows in best.tables.items():
             self._keep(table, rows)
         self.say(Found(LCurve(points, best)))
+
+    def _traded(self, every: Iterable[Trade]) -> Iterator[Trade]:
+        for trade in every:
+            yield trade
+            self._keep("tradeoff", [trade.row])
 
     def _swept(self, every: Iterable[Inversion]) -> Iterator[Inversion]:
         for found in every:
@@ -232,9 +236,9 @@ def _check(
     optimizer: str,
 ) -> None:
     """Raises InputError."""
-    if iterations < 1 or not 0.0 <= tolerance < 1.0 or not 0.0 < rate < float("inf"):
+    if iterations < 0 or not 0.0 <= tolerance < 1.0 or not 0.0 < rate < float("inf"):
         raise InputError(
-            f"--iterations {iterations} --tolerance {tolerance:g} --rate {rate:g} - give at least one iteration, a"
+            f"--iterations {iterations} --tolerance {tolerance:g} --rate {rate:g} - give iterations >= 0, a"
             " tolerance below 1 and a rate > 0"
         )
     if draws is not None and (draws < 2 or alpha_sweep is None):

@@ -53,6 +53,18 @@ def test_seen_moduli_are_found_and_blind_ones_stay_where_they_were(bar: Inversio
     assert bar.end.startswith("converged")
 
 
+@pytest.mark.parametrize(("optimizer", "iterations"), [("lbfgs", 0), ("lbfgs", 2), ("gauss-newton", 1)])
+def test_rows_of_the_bar_show_the_strains_whose_product_is_the_gradient(optimizer: str, iterations: int) -> None:
+    """Those of Gauss-Newton, too, whose own gradient is H^T r; without iterations those of the start."""
+    found = inverted("bar[sensors=3,5]", optimizer=optimizer, limits=Limits(iterations))
+    assert len(found.iterates) == 1 + iterations
+    for row in found.tables["estimates"]:
+        shown = row["view"]
+        assert shown["E"] == pytest.approx(np.exp(row["estimate"]), rel=1e-14)
+        assert shown["E"] * shown["eps[u]"] * shown["eps[lam]"] / 8 == pytest.approx(row["gradient"], rel=1e-9)
+    assert found.end.startswith("not converged")
+
+
 def test_finite_differences_take_the_same_steps_at_the_predicted_price(bar: Inversion) -> None:
     by_fd = inverted("bar", "fd-central")
     shared = min(len(bar.iterates), len(by_fd.iterates))
@@ -338,6 +350,9 @@ def test_bias_falls_and_variance_rises_as_regularization_goes() -> None:
     ]
     apart = np.mean([np.mean((found.p - found.truth) ** 2) for found in alone])
     assert total[1] == pytest.approx(apart, rel=1e-5)
+    p = np.array([found.p for found in alone])
+    np.testing.assert_allclose(trades[1].row["mean"], p.mean(axis=0), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(trades[1].row["sd"], p.std(axis=0), rtol=1e-3)
 
 
 def test_minibatches_of_load_cases_are_unbiased() -> None:
@@ -392,7 +407,7 @@ def test_the_screen_tells_what_a_misfit_costs(cli) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("--iterations", "0"), "--iterations 0"),
+        (("--iterations", "-1"), "--iterations -1"),
         (("--alpha-sweep", "1", "0.1", "3"), "0 < LEAST < MOST"),
         (("--draws", "5"), "and --alpha-sweep"),
         (("--draws", "5", "--alpha-sweep", "1e-3", "1", "3"), "without noise"),
