@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 PARTS = {  # slug -> class in the module of that name
     "derivation": "Derivation",
+    "store": "KeptRows",
 }
 
 
