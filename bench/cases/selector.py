@@ -22,6 +22,11 @@ class Selector:
         return math.prod(map(len, self.grid.values()))
 
 
+def bare(selector: str | None) -> str:
+    """`bar` of `bar[n=8], at true`."""
+    return (selector or "").partition("[")[0].partition(",")[0]
+
+
 def parse(text: str) -> Selector:
     """Parse `name` or `name[key=value,key=a|b]`; a part without `=` continues the value before it (`sensors=1,3,5`).
 

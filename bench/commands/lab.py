@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
+from pathlib import Path
 
 import click
 
-from gradient_routes.bench.command_options import complain, debug_option
+from gradient_routes.bench.command_options import complain, debug_option, store_option
 from gradient_routes.bench.commands.group import INTERRUPTED, leave
 from gradient_routes.bench.commands.interrupts import over
 from gradient_routes.bench.ranges import Whole
@@ -20,8 +21,9 @@ NEEDED = ("panel", "bokeh", "latex2mathml")
 @click.command()
 @click.option("--port", type=Whole(0, 65_535), default=5080, show_default=True, help=PORT)
 @click.option("--browser/--no-browser", default=True, show_default=True, help="Open a browser.")
+@store_option
 @debug_option
-def lab(port: int, browser: bool) -> None:
+def lab(port: int, browser: bool, store: Path) -> None:
     """Pages to play on, in the browser: derive the adjoint, invert a bar, compare routes, until Ctrl-C.
 
     What moves on a page is computed by commands of `routes`, which it shows. It listens on this machine only.
@@ -33,7 +35,7 @@ def lab(port: int, browser: bool) -> None:
 
     from gradient_routes.bench.lab.server import Laboratory
 
-    laboratory = Laboratory(port)
+    laboratory = Laboratory(port, store=store)
 
     def ready(url: str) -> None:
         echo(f"{url} until Ctrl-C")

@@ -18,6 +18,7 @@ import param
 from bokeh.document import Document
 
 from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.command_options import STORE
 from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.lab.pool import Pool
@@ -34,11 +35,13 @@ class Place:
     quick   for what follows every move of a slider
     long    for what is asked for by a button
     folder  of this session alone: uploads, and what commands read
+    store   that is looked at
     """
 
     quick: Pool
     long: Pool
     folder: Path
+    store: Path = STORE
 
 
 class Part(param.Parameterized):

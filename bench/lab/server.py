@@ -13,6 +13,7 @@ import panel as pn
 from tornado.ioloop import IOLoop
 from tornado.web import RequestHandler
 
+from gradient_routes.bench.command_options import STORE
 from gradient_routes.bench.lab.page import overview, page
 from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts import PARTS, load
@@ -27,10 +28,12 @@ class Laboratory:
     """Pools for all sessions, a folder for each, and the server.
 
     address, port  where it listens
+    store          that is looked at
     """
 
-    def __init__(self, port: int, address: str = LOOPBACK) -> None:
+    def __init__(self, port: int, address: str = LOOPBACK, store: Path = STORE) -> None:
         self.port, self.address = port or free_port(address), address
+        self.store = store
         self.pools = Pool(QUICK), Pool(LONG)
         self.root = Path(tempfile.mkdtemp(prefix="routes-lab-"))
 
@@ -42,7 +45,7 @@ class Laboratory:
         """A new session: one page with its part, as its URL says."""
         folder = Path(tempfile.mkdtemp(dir=self.root))
         query = pn.state.location.query_params if pn.state.location is not None else {}
-        part = load(slug)(Place(*self.pools, folder), {name: str(value) for name, value in query.items()})
+        part = load(slug)(Place(*self.pools, folder, self.store), {name: str(value) for name, value in query.items()})
 
         def end(_: object) -> None:
             part.stop()

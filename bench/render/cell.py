@@ -16,7 +16,7 @@ def shown(column: Column, value: Any) -> str:
         return UNITS[column.unit](value)
     if isinstance(value, float):
         return number(value, 4)
-    return value if isinstance(value, str) else json.dumps(value)
+    return value if isinstance(value, str) else str(value) if type(value) is int else json.dumps(value)
 
 
 UNITS = {"s": seconds, "byte": bytes_}

@@ -10,7 +10,8 @@ from typing import Any, Literal
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Column
 from gradient_routes.bench.cases.row import clean
-from gradient_routes.bench.render.style import Style, bare
+from gradient_routes.bench.cases.selector import bare
+from gradient_routes.bench.render.style import Style
 
 Scale = Literal["linear", "log", "category"]
 

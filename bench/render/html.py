@@ -10,11 +10,12 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render.cell import heading, shown
 from gradient_routes.bench.render.figure import Figure, Note, Section, Table
 from gradient_routes.bench.render.picking import in_order
 from gradient_routes.bench.render.source import Source
-from gradient_routes.bench.render.style import AT_NIGHT, bare, of_route
+from gradient_routes.bench.render.style import AT_NIGHT, of_route
 from gradient_routes.bench.render.vega import FIRST, guides, overlaps, panels, spec
 from gradient_routes.bench.render.view import View
 

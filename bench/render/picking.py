@@ -7,9 +7,9 @@ from typing import TypeVar
 
 from gradient_routes.bench.cases import registry
 from gradient_routes.bench.cases.column import Column, Row
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render.figure import Table
 from gradient_routes.bench.render.source import schema
-from gradient_routes.bench.render.style import bare
 
 Key = TypeVar("Key", bound=Hashable)
 

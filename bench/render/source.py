@@ -17,7 +17,8 @@ from gradient_routes.bench.cases.registry import Kind
 from gradient_routes.bench.cases.row import COLUMNS
 from gradient_routes.bench.render.terminal.tables import asked
 from gradient_routes.bench.sanitize import plain
-from gradient_routes.bench.store.cases import IDS, cases, numbered
+from gradient_routes.bench.store.cases import EVERY, IDS, cases, numbered
+from gradient_routes.bench.store.filter import EVERYTHING, Filter
 from gradient_routes.bench.store.schema import tables as schema_tables
 from gradient_routes.bench.store.store import Store
 
@@ -92,9 +93,11 @@ class Source:
         return [row for row in self.cases if row["status"] == "ok"]
 
 
-def read(store: Store) -> Source:
+def read(store: Store, where: Filter = EVERYTHING) -> Source:
     """Everything a report shows. Raises InputError where there is no store."""
-    every = [*{row["case_key"] or _unkeyed(row): row for row in cases(store, LIGHT, parse=False)}.values()]
+    names = LIGHT if where.empty else (*EVERY, *IDS)
+    newest_cases = {row["case_key"] or _unkeyed(row): row for row in cases(store, names, parse=False)}
+    every = [row for row in newest_cases.values() if where.keeps(row)]
     shown = latest([*numbered(store, thinned(every))])
     declared = registry.study_tables()
     found = {name: newest(store.records(name), table.question) for name, table in declared.items()}
@@ -104,7 +107,7 @@ def read(store: Store) -> Source:
         kept=store.count(),
         environments=[_plain(row) for row in store.records("environments")],
         studies=[_plain(row) for row in store.records("studies")],
-        tables={name: [_plain(row) for row in rows] for name, rows in named.items()},
+        tables={name: [_plain(row) for row in rows if where.keeps(row)] for name, rows in named.items()},
         name=plain(store.path.name),
         note=undeclared(every),
         counts=Counts.of(every),

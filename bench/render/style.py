@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render.terminal.palette import ROUTES
 
 MARKERS = {  # as Vega names them
@@ -53,11 +54,6 @@ def of_route(name: str) -> Style:
         return Style(ROUTES[name], MARKERS[name])
     digest = blake2b(name.encode("utf-8", "backslashreplace"), digest_size=2).digest()
     return Style(OTHERS[digest[0] % len(OTHERS)], SHAPES[digest[1] % len(SHAPES)])
-
-
-def bare(selector: str | None) -> str:
-    """`bar` of `bar[n=8], at true`."""
-    return (selector or "").partition("[")[0].partition(",")[0]
 
 
 def of_routes(names: Iterable[str]) -> dict[str, Style]:

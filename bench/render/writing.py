@@ -9,6 +9,7 @@ from gradient_routes.bench.render import html, markdown, pictures
 from gradient_routes.bench.render.figure import Section
 from gradient_routes.bench.render.sections import sections
 from gradient_routes.bench.render.source import Source, read
+from gradient_routes.bench.store.filter import EVERYTHING, Filter
 from gradient_routes.bench.store.output_files import Output, print_bytes
 from gradient_routes.bench.store.store import Store
 
@@ -16,7 +17,9 @@ STDOUT = Path("-")
 SUFFIXES = (".html", ".htm", ".md", ".markdown")
 
 
-def report(store: Store, output: Path | None, format: str | None, folder: Path | None) -> list[str]:
+def report(
+    store: Store, output: Path | None, format: str | None, folder: Path | None, where: Filter = EVERYTHING
+) -> list[str]:
     """Write what is asked for: a page or Markdown to `output` (stdout where none), figures to `folder`.
 
     Sentences for what was written. Raises RoutesError.
@@ -26,7 +29,7 @@ def report(store: Store, output: Path | None, format: str | None, folder: Path |
         file.check([store.path])
     if folder is not None:
         pictures.check(folder)
-    source = read(store)
+    source = read(store, where)
     made = sections(source)
     drawn = [] if folder is None else pictures.write(made, folder, store.path)
     said = [] if folder is None else [f"{len(drawn)} figures as {', '.join(pictures.FORMATS)} in {folder}"]

@@ -7,12 +7,14 @@ import io
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases.suggest import did_you_mean
 from gradient_routes.bench.sanitize import plain
+from gradient_routes.bench.store.filter import EVERYTHING, Filter
 from gradient_routes.bench.store.frames import frame
 from gradient_routes.bench.store.output_files import Output, print_bytes
 from gradient_routes.bench.store.schema import tables
@@ -23,20 +25,32 @@ AT_ONCE = 1000  # rows
 SUFFIXES = (".csv", ".json", ".parquet")
 
 
-def export(store: Store, table: str, format: str, output: Path | None) -> None:
-    """Write a table of the store as CSV, Parquet or a JSON array of row objects, to a file or to stdout."""
+def export(store: Store, table: str, format: str, output: Path | None, where: Filter = EVERYTHING) -> None:
+    """Write rows of a table of the store as CSV, Parquet or a JSON array of objects, to a file or to stdout."""
     if table not in tables():
         raise InputError(f"export: no table '{table}' - {did_you_mean(table, tables())}")
+    if lacking := where.lacking([column.name for column in tables()[table]]):
+        raise InputError(f"export: table '{table}' has no column '{lacking[0]}' - leave --{lacking[0]} out")
     if output is None and format == "parquet" and sys.stdout.isatty():
         raise InputError("export: parquet is binary and stdout is a terminal - name a file with -o")
     file = None if output is None else Output("export -o", output, SUFFIXES)
     if file is not None:
         file.check([store.path])
-    if format == "parquet":
-        _write(file, iter([_parquet(table, *store.table(table))]))
-        return
-    with store.streamed(table) as (names, records):
+    with filtered(store, table, where) as (names, records):
+        if format == "parquet":
+            _write(file, iter([_parquet(table, names, [*records])]))
+            return
         _write(file, (_json if format == "json" else _csv)(names, records))
+
+
+@contextmanager
+def filtered(store: Store, table: str, where: Filter) -> Iterator[tuple[list[str], Iterator[tuple[Any, ...]]]]:
+    """Column names and rows of a table, one at a time."""
+    with store.streamed(table) as (names, records):
+        if where.empty:
+            yield names, records
+        else:
+            yield names, (record for record in records if where.keeps(dict(zip(names, record, strict=True))))
 
 
 def _write(file: Output | None, pieces: Iterator[bytes]) -> None:

@@ -50,8 +50,8 @@ class Store:
     1        2     bar  fd-central     ok                   16
     """
 
-    def __init__(self, path: Path | str) -> None:
-        self.path = Path(path)
+    def __init__(self, path: Path | str, patience: float = PATIENCE) -> None:
+        self.path, self.patience = Path(path), patience
         self.file = located(path)  # code of others may change the working folder
 
     @property
@@ -226,7 +226,7 @@ class Store:
         with self._errors():
             if not self.file.is_file():
                 raise InputError(f"store {self.path}: no such file - run `routes run` first, or name one with --store")
-            with closing(sqlite3.connect(self._uri("rw"), uri=True, timeout=PATIENCE)) as db:
+            with closing(sqlite3.connect(self._uri("rw"), uri=True, timeout=self.patience)) as db:
                 if not self._has_tables(db):
                     raise InputError(f"store {self.path}: is empty - run `routes run` first, or name another")
                 self._check_kind(db)
@@ -238,7 +238,9 @@ class Store:
         with self._errors():
             self._refuse_others()
             self.file.parent.mkdir(parents=True, exist_ok=True)
-            with closing(sqlite3.connect(self._uri("rwc"), uri=True, timeout=PATIENCE, isolation_level=None)) as db:
+            with closing(
+                sqlite3.connect(self._uri("rwc"), uri=True, timeout=self.patience, isolation_level=None)
+            ) as db:
                 db.execute("BEGIN IMMEDIATE")
                 if self._has_tables(db):
                     self._check_kind(db)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 PARTS = {  # slug -> class in the module of that name
     "derivation": "Derivation",
     "inverter": "Inverter",
+    "store": "KeptRows",
 }
 
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render.figure import Axis, Figure, Guide, Section, Told
 from gradient_routes.bench.render.format import number, seconds
 from gradient_routes.bench.render.picking import doubt, each, grouped, tabulate, text
 from gradient_routes.bench.render.source import Source, selector
-from gradient_routes.bench.render.style import bare
 from gradient_routes.bench.render.terminal.tables import RESOLUTION
 from gradient_routes.bench.studies.bill.figures import DOUBT, FORWARD, GUIDES, HOLLOW, MEMORY, SECONDS, TAPE
 from gradient_routes.bench.studies.tolerance.figures import without_following

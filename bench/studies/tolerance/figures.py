@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 from gradient_routes.bench.cases.column import Row
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render.figure import Axis, Figure, Section
 from gradient_routes.bench.render.format import number
 from gradient_routes.bench.render.picking import each, real, tabulate
 from gradient_routes.bench.render.source import Source, selector
-from gradient_routes.bench.render.style import bare
 from gradient_routes.bench.studies.bill.figures import ERROR
 from gradient_routes.bench.studies.tolerance.view import swept
 

@@ -22,13 +22,14 @@ from benchmarks.browser import DARK, NAMES, browser, opened
 from benchmarks.invented_store import MAKERS, ROUTES, fill, measured, whole_row
 from gradient_routes.bench.cases.registry import study_tables
 from gradient_routes.bench.cases.row import empty_row
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render import html, markdown, pictures
 from gradient_routes.bench.render.figure import Axis, Figure, Section, Table
 from gradient_routes.bench.render.marks import MARKS
 from gradient_routes.bench.render.picking import real
 from gradient_routes.bench.render.sections import sections
 from gradient_routes.bench.render.source import Source, newest, read
-from gradient_routes.bench.render.style import CONTRAST, NIGHT, PAPER, bare, contrast, of_route
+from gradient_routes.bench.render.style import CONTRAST, NIGHT, PAPER, contrast, of_route
 from gradient_routes.bench.render.terminal.palette import ROUTES as COLOURS
 from gradient_routes.bench.render.vega import overlaps, records, spec, svg
 from gradient_routes.bench.render.view import View
