@@ -80,10 +80,11 @@ def _first(ranked: Sequence[Bill]) -> Bill | None:
 
 
 def _rank(bill: Bill, error: float) -> tuple[float, ...]:
-    """Prices are told apart by three digits, of equal ones memory decides, then the error."""
+    """Prices are told apart by three digits; of equal ones memory decides, then fewer options, then the error."""
     exact = bill.error <= error
     price = float(f"{bill.seconds:.2e}")
-    return bill.objection is not None, not exact, 0.0 if exact else bill.error, price, bill.memory, bill.error
+    equal = bill.memory, len(bill.options), bill.error
+    return bill.objection is not None, not exact, 0.0 if exact else bill.error, price, *equal
 
 
 def reasons(answers: Answers, ranked: Sequence[Bill]) -> list[Statement]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial, reduce
-from operator import or_
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gradient_routes.bench.advice import HAVE
 from gradient_routes.bench.command_options import at_option, debug_option, refuse_given
 from gradient_routes.bench.commands.group import FAILED
 from gradient_routes.bench.ranges import FRACTION, MANY, SECONDS, Real
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gradient_routes.bench.advice.answers import Answers
 
 TOLD = ("parameters", "unknowns", "steps", "newton_steps", "have", "kinks", "forward", "solve")  # by --problem
-HAVE = ("value", "solve", "linearize", "trace", "complex")
+WANTED = ("outputs", "iterate", "error", "memory", "gradients", "budget")  # whatever the problem
 OFFERS = (
     "What can be evaluated; may be repeated. value: J(p) alone; solve: R, R_u and J; linearize: their partial"
     " derivatives R_p, J_u, J_p as well; trace: R and J written in jax.numpy; complex: R and J take complex numbers."
@@ -58,26 +58,7 @@ ERROR = "Relative error that the gradient may have."
 @at_option
 @click.option("--json", "as_json", is_flag=True, help="One JSON object and nothing else.")
 @debug_option
-def advise(
-    selector: str | None,
-    at: str,
-    parameters: int,
-    outputs: int,
-    unknowns: int,
-    steps: int | None,
-    newton_steps: int,
-    have: tuple[str, ...],
-    kinks: bool,
-    iterate: bool,
-    rtol: float,
-    error: float,
-    memory: str,
-    gradients: int,
-    budget: float,
-    forward: float,
-    solve: float | None,
-    as_json: bool,
-) -> None:
+def advise(selector: str | None, at: str, rtol: float, as_json: bool, **given: Any) -> None:
     """Recommend a route: the cheapest whose expected error is small enough, with its bill and the reasons.
 
     \b
@@ -94,41 +75,19 @@ def advise(
     Exit code: 0 if a route is recommended, 1 if none is possible, 2 for wrong usage.
     """
     from gradient_routes.bench.advice.advise import advise as advised
-    from gradient_routes.bench.advice.answers import Answers
+    from gradient_routes.bench.advice.asked import answers_of
     from gradient_routes.bench.advice.wording import plain
     from gradient_routes.bench.cases.row import as_json as json_line
     from gradient_routes.bench.commands.advise_view import show
-    from gradient_routes.bench.execution.isolation.limits import memory_of
     from gradient_routes.bench.render.terminal.tables import console
-    from gradient_routes.problems.problem import Offers
 
-    room = memory_of(memory)
-    wanted: dict[str, Any] = {
-        "outputs": outputs,
-        "iterate": iterate,
-        "error": error,
-        "memory": math.inf if room is None else room,
-        "gradients": gradients,
-        "budget": budget,
-    }
-    if selector is not None:
-        refuse_given(TOLD, "is told by --problem")
-        answers = replace(of_problem(selector, at, rtol), **wanted)
-    else:
+    answers = answers_of(rtol=rtol, **given)
+    if selector is None:
         refuse_given(("at",), "is a point of a --problem")
-        offers = reduce(or_, (Offers[name.upper()] | Offers.VALUE for name in have))
-        answers = Answers(
-            n_p=parameters,
-            n_u=unknowns,
-            steps=steps or 0,
-            newton=newton_steps,
-            offers=offers if offers == Offers.VALUE else offers | Offers.SOLVE,
-            smooth=not kinks,
-            rtol=rtol,
-            forward_s=forward,
-            solve_s=solve,
-            **wanted,
-        )
+    else:
+        refuse_given(TOLD, "is told by --problem")
+        own = of_problem(selector, at, rtol)
+        answers = replace(own, **{name: getattr(answers, name) for name in WANTED})
     advice = advised(answers)
     if as_json:
         echo(json_line(plain(advice)))

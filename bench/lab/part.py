@@ -106,7 +106,10 @@ class Part(param.Parameterized):
 
     def query(self) -> str:
         """The state as the search of a URL: what differs from the defaults."""
-        state = {name: getattr(self, name) for name in self.fields}
+        return self.query_of({name: getattr(self, name) for name in self.fields})
+
+    def query_of(self, state: Mapping[str, Any]) -> str:
+        """The same of another state."""
         return urlencode({name: written(v) for name, v in state.items() if v != self._defaults[name]}, safe=",")
 
     def url(self) -> str:

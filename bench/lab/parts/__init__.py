@@ -12,6 +12,7 @@ PARTS = {  # slug -> class in the module of that name
     "derivation": "Derivation",
     "inverter": "Inverter",
     "store": "KeptRows",
+    "which-route": "WhichRoute",
 }
 
 
