@@ -38,7 +38,7 @@ def sources() -> list[str]:
 def of_the_package() -> set[str]:
     """The files that are installed, by their places there."""
     below = {f"gradient_routes/{name}" for name in sources() if name.startswith(tuple(f"{f}/" for f in FLOORS))}
-    return below | {f"gradient_routes/{name}" for name in ("__init__.py", "__main__.py", "py.typed")}
+    return below | {f"gradient_routes/{name}" for name in ("__init__.py", "__main__.py", "lab.py", "py.typed")}
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ def _inside(kind: click.ParamType) -> float:
 
 
 def test_zero_is_allowed_where_it_means_something() -> None:
-    allowed = {"min-time", "seed", "tolerance", "accept", "port"}
+    allowed = {"min-time", "seed", "tolerance", "accept", "port", "iterations"}
     for command, option in NUMERIC:
         name = option.opts[0].removeprefix("--")
         for kind in kinds(option):

@@ -65,10 +65,10 @@ class Part(param.Parameterized):
         self._document: Document | None = pn.state.curdoc
         self._moves, self.pushed = 0, nothing
         self._following: asyncio.Task[None] | None = None
-        refused = self._read(query or {})
+        self._refused = self._read(query or {})
         self.param.watch(self._changed, self.fields)
         self._show()
-        self.say(*refused)
+        self.say(bad=bool(self._refused))
 
     # what a part writes
 
@@ -128,13 +128,18 @@ class Part(param.Parameterized):
         return refused
 
     def say(self, *lines: str, bad: bool = True) -> None:
-        """Show lines where the page says how it stands; read aloud by screen readers."""
+        """Show lines where the page says how it stands; read aloud by screen readers.
+
+        What of its URL was not taken is said before them, until the state changes.
+        """
+        lines = (*self._refused, *lines)
         kind = "bad" if bad and lines else "quiet"
         self.status.object = f'<p role="status" class="{kind}">{"<br>".join(map(html.escape, lines))}</p>'
 
     # the commands
 
     def _changed(self, *_: Any) -> None:
+        self._refused = []
         self._show()
         if self.at_once:
             self.start()
