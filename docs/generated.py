@@ -8,6 +8,7 @@ from __future__ import annotations
 import enum
 import inspect
 import re
+import runpy
 import textwrap
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -28,6 +29,7 @@ from gradient_routes.routes.route import Route
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "reference"
+TOUR = runpy.run_path(str(HERE / "tour.py"))["tour"]
 RESULTS = HERE.parent / "results" / "README.md"
 
 
@@ -41,6 +43,7 @@ def pages() -> dict[str, str]:
         "tables.md": tables(),
         "python.md": python(),
         "glossary.md": glossary(),
+        "tour.md": TOUR(str(HERE.parent / "examples" / "tour.ipynb")),
     }
 
 

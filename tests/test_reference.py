@@ -96,5 +96,16 @@ def test_only_changed_pages_are_written(tmp_path) -> None:
     (tmp_path / "reference" / "routes.md").write_text("old")
     GENERATED["write"](tmp_path / "reference")
     after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "reference").iterdir()}
-    assert len(before) == 7
+    assert len(before) == 8
     assert {name for name in after if after[name] != before[name]} == {"routes.md"}
+
+
+def test_the_tour_is_a_page(pages: dict[str, str]) -> None:
+    """With its text, code and pictures; formulas are set, links lead to pages of the site."""
+    page = pages["tour.md"]
+    assert page.startswith("# What a gradient can tell")
+    assert page.count("```python\n") > 10
+    assert page.count("src='data:image/svg+xml") > 8
+    assert "<math" in page
+    assert "$" not in page
+    assert "](../tutorial.md)" in page

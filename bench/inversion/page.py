@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gradient_routes.bench.inversion import estimates_figures as estimates
+from gradient_routes.bench.inversion.diagnosis import MISLED
 from gradient_routes.bench.inversion.history_figure import ENDS, STEPS, history, named
 from gradient_routes.bench.inversion.result import Inversion
 from gradient_routes.bench.render import notebook
@@ -18,7 +19,8 @@ def fragment(found: Inversion) -> str:
     said = [*found.view.remarks, *([] if found.fit is None else found.fit.described.splitlines())]
     notes = tuple(Note("note:", remark) for remark in said)
     section = Section("inversion", "Inversion", "", tuple(f for f in figures if f is not None), notes=notes)
-    return notebook.shown(f"{found.label}:", "", found.end, section)
+    doubt = MISLED if found.misled else found.fit.verdict if found.fit is not None else ""
+    return notebook.shown(f"{found.label}:", doubt, found.end, section)
 
 
 def _spent(found: Inversion) -> str:

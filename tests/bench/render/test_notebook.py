@@ -8,15 +8,18 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from commands import ROOT
 
 from gradient_routes import check, identify, invert, vcurve
 from gradient_routes.bench.render import notebook
 
 PICTURE = re.compile(r"src='data:image/svg\+xml;base64,([^']+)'")
+DATA = ROOT / "examples" / "bar_displacements.csv"
 MADE = {
     "vcurve": lambda: vcurve("bar[n=3,sensors=2]", per_decade=2),
     "check": lambda: check(lambda p: p @ p, lambda p: -2 * p, start=np.ones(2), name="<b>mine</b>"),
     "invert": lambda: invert("bar[n=3,sensors=2]", optimizer="gauss-newton"),
+    "measured": lambda: invert(f"bar[data={DATA},noise=0.001,alpha=1e-3]", optimizer="gauss-newton"),
     "identify": lambda: identify("bar[n=3,sensors=2]", noise=0.01),
     "cells": lambda: identify("plate[n=2,derivatives=hand]", noise=0.01),
 }
@@ -24,6 +27,7 @@ SAYS = {
     "vcurve": ("<span class='verdict good'>agrees</span>", "Next: use the gradient"),
     "check": ("<span class='verdict bad'>wrong-gradient</span>", "&lt;b&gt;mine&lt;/b&gt;", "Wrong components"),
     "invert": ("converged", "forward solves", "1 of 3 blind", "truth"),
+    "measured": ("<span class='verdict unsure'>misfit exceeds noise</span>", "note: misfit exceeds noise: residuals"),
     "identify": ("2 of 3 directions identifiable", "1 blind", "null share"),
     "cells": ("directions identifiable", "null share"),
 }
