@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from gradient_routes.bench.cases.column import Column
+from gradient_routes.bench.cases.column import Column, Row
 from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render import html
 from gradient_routes.bench.render.cell import heading, shown
@@ -28,6 +28,7 @@ PATIENCE = 5.0  # [s] to wait for a writer of the store
 LONGEST = 60  # characters of a cell
 INSIDE = "header.title { display: none } section { padding-top: .8rem } figure { margin-top: .8rem }"
 Record = tuple[Any, ...]
+Choices = dict[str, dict[str, int]]
 
 
 @dataclass(frozen=True)
@@ -41,36 +42,46 @@ class Rows:
     first: int
     kept: int
     every: int
-    choices: dict[str, dict[str, int]]
+    choices: Choices
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A section as a page that needs nothing else; ids and titles of all sections."""
+    """A section as a page that needs nothing else; ids and titles of all sections; choices as those of rows."""
 
     page: str
     section: str
     sections: dict[str, str]
+    choices: Choices
 
 
 def rows(store: Store, table: str, where: Filter, first: int) -> Rows:
     """Raises InputError where the store cannot be read."""
-    columns = {column.name: column for column in tables()[table]}
-    counted: dict[str, Counter[str]] = {name: Counter() for name in COLUMNS if name in columns}
+    declared = {column.name: column for column in tables()[table]}
+    counted: dict[str, Counter[str]] = {name: Counter() for name in COLUMNS if name in declared}
     seen: list[Record] = []
     every = kept = 0
     with store.streamed(table) as (names, records):
-        places = {name: names.index(name) for name in counted if name in names}
-        for every, record in enumerate(records, 1):  # noqa: B007
-            for name, k in places.items():
-                if isinstance(record[k], str):
-                    counted[name][bare(record[k]) if name in ("problem", "route") else record[k]] += 1
-            if where.empty or where.keeps(dict(zip(names, record, strict=True))):
+        for record in records:
+            row = dict(zip(names, record, strict=True))
+            every += 1
+            _count(counted, row)
+            if where.keeps(row):
                 kept += 1
                 if first < kept <= first + MOST:
                     seen.append(record)
-    known = [columns.get(name, Column(name, "TEXT", "", "")) for name in names]
-    return Rows(_table(table, known, seen), first, kept, every, {name: dict(of) for name, of in counted.items()})
+    columns = [declared.get(name, Column(name, "TEXT", "", "")) for name in names]
+    return Rows(_table(table, columns, seen), first, kept, every, _plain(counted))
+
+
+def _count(counted: dict[str, Counter[str]], row: Row) -> None:
+    for name, of in counted.items():
+        if isinstance(value := row.get(name), str):
+            of[bare(value) if name in ("problem", "route") else value] += 1
+
+
+def _plain(counted: dict[str, Counter[str]]) -> Choices:
+    return {name: dict(sorted(of.items())) for name, of in counted.items()}
 
 
 def _table(name: str, columns: Sequence[Column], records: Sequence[Record]) -> str:
@@ -106,14 +117,28 @@ def drawn(store: Store, where: Filter, section: str) -> Drawn:
     """The section of this id; of another, the first one with a figure. Raises InputError as `rows` does."""
     store.count()
     kept = store.file.stat()
-    found = {s.id: s for s in _sections(store.file, (kept.st_mtime_ns, kept.st_size), where)}
+    stamp = kept.st_mtime_ns, kept.st_size
+    found = {s.id: s for s in _sections(store.file, stamp, where)}
     chosen = found.get(section) or next((s for s in found.values() if any(f.mark for f in s.figures)), None)
     chosen = chosen or next(iter(found.values()))
     page = html.page(plain(store.path.name), "", [chosen])
-    return Drawn(page.replace("</style>", f"{INSIDE}</style>", 1), chosen.id, {s.id: s.title for s in found.values()})
+    page = page.replace("</style>", f"{INSIDE}</style>", 1)
+    return Drawn(page, chosen.id, {s.id: s.title for s in found.values()}, _choices(store.file, stamp))
 
 
 @lru_cache(maxsize=1)
 def _sections(file: Path, stamp: tuple[int, int], where: Filter) -> list[Section]:
     """Of a store as it was; by the stamp one knows whether it has changed."""
     return sections(read(Store(file, PATIENCE), where))
+
+
+@lru_cache(maxsize=1)
+def _choices(file: Path, stamp: tuple[int, int]) -> Choices:
+    """Of all tables."""
+    counted: dict[str, Counter[str]] = {name: Counter() for name in COLUMNS}
+    for table, columns in tables().items():
+        if {column.name for column in columns} & {*COLUMNS}:
+            with Store(file, PATIENCE).streamed(table) as (names, records):
+                for record in records:
+                    _count(counted, dict(zip(names, record, strict=True)))
+    return _plain(counted)

@@ -15,7 +15,7 @@ from typing import cast
 
 import psutil
 
-from gradient_routes.bench.cases.status import Status
+from gradient_routes.bench.cases.status import Status, one_line
 from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.limits import Limits
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Order
@@ -55,12 +55,16 @@ class Worker:
     """One process; a new one after the old one had to be killed."""
 
     def __init__(self, lane: Lane) -> None:
-        self._lane, self._unwanted, self._busy = lane, threading.Event(), threading.Lock()
+        self._lane, self._unwanted, self._closed = lane, threading.Event(), False
+        self._starting, self._owning = threading.Lock(), threading.Lock()
         self._line: WorkerProcess | None = None
+
+    def wanted(self) -> None:
+        """A job will come."""
+        self._unwanted.clear()
 
     def do(self, job: Job) -> Iterator[Message]:
         """Yield the messages of a job, Ended last. Blocks; `leave` from another thread ends it."""
-        self._unwanted.clear()
         line = self.started()
         if isinstance(line, Ended):
             yield line
@@ -71,8 +75,11 @@ class Worker:
             if self._unwanted.is_set() or time.monotonic() > deadline:
                 raise Over
 
-        line.say(cast(Order, job))
         message: Message = None
+        if not self._unwanted.is_set():
+            line.say(cast(Order, job))
+        else:
+            message = Finished(Ended(Status.INTERRUPTED))  # nobody waits for it any more
         while not isinstance(message, Finished | Ended):
             try:
                 message = line.hear(look)
@@ -81,29 +88,38 @@ class Worker:
             if not isinstance(message, Finished | Ended):
                 yield message
         if isinstance(message, Ended) or self._grown(line):
-            self.close()
+            self._drop()
         yield message.end if isinstance(message, Finished) else message
 
     def started(self) -> WorkerProcess | Ended:
         """Its process, ready for a job; how it ended where it cannot start."""
-        with self._busy:
-            if self._line is None:
-                self._line = WorkerProcess(
-                    Listening(self._lane.first, self._lane.patience), Limits(math.inf, self._lane.memory)
-                )
-                while not isinstance(message := self._line.hear(), Ready):
-                    if isinstance(message, Ended):
-                        self.close()
-                        return message
-            return self._line
+        with self._starting:
+            if self._line is not None:
+                return self._line
+            with self._owning:
+                if self._closed:
+                    return Ended(Status.INTERRUPTED, "closed", killed=True)
+                listening = Listening(self._lane.first, self._lane.patience)
+                line = self._line = WorkerProcess(listening, Limits(math.inf, self._lane.memory))
+            while not isinstance(message := line.hear(), Ready):
+                if isinstance(message, Ended):
+                    self._drop()
+                    return message
+            return line
 
     def leave(self) -> None:
-        """End the job that runs."""
+        """End the job that runs, or was to."""
         self._unwanted.set()
 
     def close(self) -> None:
-        """Kill its process."""
-        line, self._line = self._line, None
+        """Kill its process; there is no other one then."""
+        self.leave()
+        self._closed = True
+        self._drop()
+
+    def _drop(self) -> None:
+        with self._owning:
+            line, self._line = self._line, None
         if line is not None:
             line.close()
 
@@ -120,24 +136,37 @@ class Pool:
         self.lane, self.waiting = lane, 0
         self._threads = ThreadPoolExecutor(lane.workers)
         self._all = [Worker(lane) for _ in range(lane.workers)]
-        self._idle: asyncio.Queue[Worker] = asyncio.Queue()
-        for worker in self._all:
-            self._idle.put_nowait(worker)
+        self._free = [*self._all]
+        self._turns = asyncio.Semaphore(lane.workers)
 
     async def messages(self, job: Job) -> AsyncGenerator[Message]:
         """Those of a job as they come, Ended last. Closed early, it ends the job."""
         self.waiting += 1
         try:
-            worker = await self._idle.get()
+            await self._turns.acquire()
         finally:
             self.waiting -= 1
+        worker = self._free.pop()  # the one that ended last: it may remember what it has read
+        worker.wanted()
         loop, heard = asyncio.get_running_loop(), asyncio.Queue[Message]()
 
-        def listen() -> None:
-            for message in worker.do(job):
+        def tell(message: Message) -> None:
+            with suppress(RuntimeError):  # the loop is closed: nobody listens
                 loop.call_soon_threadsafe(heard.put_nowait, message)
 
-        listening = loop.run_in_executor(self._threads, listen)
+        def listen() -> None:
+            try:
+                for message in worker.do(job):
+                    tell(message)
+                worker.started()  # where it had to be killed, another one is there for the next job
+            except Exception as failure:  # a job that cannot be sent, a process that cannot be made
+                tell(Ended(Status.FAILED, one_line(failure)))
+
+        def free(_: asyncio.Future[None]) -> None:
+            self._free.append(worker)
+            self._turns.release()
+
+        loop.run_in_executor(self._threads, listen).add_done_callback(free)
         try:
             message: Message = None
             while not isinstance(message, Ended):
@@ -145,8 +174,6 @@ class Pool:
                 yield message
         finally:
             worker.leave()
-            await listening
-            self._idle.put_nowait(worker)
 
     def warm(self) -> None:
         """Start the processes, without waiting for them."""
@@ -156,6 +183,5 @@ class Pool:
     def close(self) -> None:
         """Kill all processes."""
         for worker in self._all:
-            worker.leave()
             worker.close()
         self._threads.shutdown(cancel_futures=True)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import re
 import shutil
+import signal
 import socket
 import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import cast
 
 import panel as pn
+from bokeh.server.server import Server
 from tornado.ioloop import IOLoop
-from tornado.web import RequestHandler
+from tornado.web import HTTPError, RequestHandler
 
 from gradient_routes.bench.command_options import STORE
 from gradient_routes.bench.lab.page import overview, page
@@ -35,7 +42,6 @@ class Laboratory:
         self.port, self.address = port or free_port(address), address
         self.store = store
         self.pools = Pool(QUICK), Pool(LONG)
-        self.root = Path(tempfile.mkdtemp(prefix="routes-lab-"))
 
     @property
     def url(self) -> str:
@@ -59,40 +65,68 @@ class Laboratory:
         return lambda: self.session(slug)  # Panel takes functions and methods only
 
     def serve(self, ready: Callable[[str], None]) -> None:
-        """Serve until it is interrupted; `ready` is called with the address. Raises OSError for a port in use."""
+        """Serve until SIGINT or SIGTERM; `ready` is called with the address. Raises OSError for a port in use, at the
+        end KeyboardInterrupt.
+        """
         logging.basicConfig(level=logging.WARNING, format="routes lab: %(name)s: %(message)s")
-        first = overview()
+        logging.getLogger("tornado.access").setLevel(logging.ERROR)  # what is refused is told to who asked
+        with ExitStack() as closing:
+            self.root = Path(
+                closing.enter_context(TemporaryDirectory(prefix="routes-lab-", ignore_cleanup_errors=True))
+            )
+            for pool in self.pools:
+                closing.callback(pool.close)
+            server = self._server()
+            closing.callback(server.stop)
+            loop = IOLoop.current()
+            for number in (signal.SIGINT, signal.SIGTERM):
+                asyncio.get_event_loop().add_signal_handler(number, loop.stop)
+            server.start()
+            for pool in self.pools:
+                pool.warm()
+            loop.add_callback(ready, self.url)
+            loop.start()
+        raise KeyboardInterrupt
 
-        class Overview(RequestHandler):
-            def get(self) -> None:
-                self.write(first)
-
+    def _server(self) -> Server:
+        """Listening; nothing is served before it is started."""
+        hosts = {self.address, "localhost", LOOPBACK}
         server = pn.serve(
             {slug: self._application(slug) for slug in PARTS},
             title={slug: f"{load(slug).title} - gradient-routes" for slug in PARTS},
             port=self.port,
             address=self.address,
-            websocket_origin=[f"{host}:{self.port}" for host in {self.address, "localhost", LOOPBACK}],
+            websocket_origin=[f"{host}:{self.port}" for host in hosts],
             show=False,
             start=False,
             verbose=False,
-            extra_patterns=[("/", Overview)],
+            extra_patterns=[("/", Words, {"text": overview()})],
             websocket_max_message_size=UPLOAD,
             unused_session_lifetime_milliseconds=IDLE,
             check_unused_sessions_milliseconds=IDLE // 4,
         )
-        server.start()
-        for pool in self.pools:
-            pool.warm()
-        loop = IOLoop.current()
-        loop.add_callback(ready, self.url)
-        try:
-            loop.start()
-        finally:
-            server.stop()
-            for pool in self.pools:
-                pool.close()
-            shutil.rmtree(self.root, ignore_errors=True)
+        # a name of somebody's that leads to this machine (DNS rebinding); what would import any module by its name
+        others = f"(?!(?:{'|'.join(map(re.escape, hosts))})$).*"
+        server._tornado.add_handlers(others, [(".*", Refused)])
+        server._tornado.add_handlers(".*", [("/components/.*", Refused), (".*/autoload.js", Refused)])
+        return cast(Server, server)
+
+
+class Words(RequestHandler):
+    """A page that does not change."""
+
+    def initialize(self, text: str) -> None:
+        self.text = text
+
+    def get(self) -> None:
+        self.write(self.text)
+
+
+class Refused(RequestHandler):
+    """Nothing is served here, whatever is asked."""
+
+    def prepare(self) -> None:
+        raise HTTPError(403)
 
 
 def free_port(address: str) -> int:

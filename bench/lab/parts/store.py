@@ -76,7 +76,7 @@ class KeptRows(Part):
         self._later_rows.on_click(lambda _: self._turn(looking.MOST))
         self._table = pn.widgets.Select.from_param(self.param.table, width=170)
         search = pn.widgets.TextInput.from_param(self.param.search, width=200, placeholder="text in any column")
-        shown = pn.widgets.RadioButtonGroup.from_param(self.param.show, width=200, align="end")
+        shown = pn.widgets.RadioBoxGroup.from_param(self.param.show, inline=True, align="center")
         self.param.watch(self._again, ["show", "table", *FIELDS.values(), "search"])
         self._fit()
         return pn.Column(
@@ -117,6 +117,10 @@ class KeptRows(Part):
         known = {"": ANY, **({chosen: chosen} if chosen else {}), **choices}
         self._selects[name].options = {text: value for value, text in known.items()}
 
+    def _offer_rows(self, choices: looking.Choices) -> None:
+        for name, counted in choices.items():
+            self._offer(name, {value: f"{value} ({count})" for value, count in counted.items()})
+
     def take(self, message: Message) -> None:
         match message:
             case Returned(looking.Rows() as rows):
@@ -125,8 +129,7 @@ class KeptRows(Part):
                 self._frame(drawn)
 
     def _list(self, rows: looking.Rows) -> None:
-        for name, counted in rows.choices.items():
-            self._offer(name, {value: f"{value} ({count})" for value, count in sorted(counted.items())})
+        self._offer_rows(rows.choices)
         last = min(rows.first + looking.MOST, rows.kept)
         of = f"{rows.kept} rows" if rows.kept == rows.every else f"{rows.kept} of {rows.every} rows"
         said = f"Rows {rows.first + 1} to {last} of {of}." if last > rows.first else f"None of {of}."
@@ -135,6 +138,7 @@ class KeptRows(Part):
         self._seen.object = rows.text
 
     def _frame(self, drawn: looking.Drawn) -> None:
+        self._offer_rows(drawn.choices)
         self._offer("section", drawn.sections)
         self._count.object = ""
         self._seen.object = (

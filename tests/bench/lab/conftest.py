@@ -8,10 +8,14 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from commands import ROOT
 from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from benchmarks.invented_store import fill
+from gradient_routes.bench.store.store import Store
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 PATIENCE = 60_000  # [ms] for what takes a tenth of a second on an idle machine
@@ -20,9 +24,17 @@ expect.set_options(timeout=PATIENCE)
 
 
 @pytest.fixture(scope="session")
-def laboratory() -> Iterator[str]:
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The store that it shows."""
+    path = tmp_path_factory.mktemp("store") / "kept.sqlite"
+    fill(Store(path), 240)
+    return path
+
+
+@pytest.fixture(scope="session")
+def laboratory(kept: Path) -> Iterator[str]:
     """Its address."""
-    command = [sys.executable, "-m", "gradient_routes", "lab", "--no-browser", "--port", "0"]
+    command = [sys.executable, "-m", "gradient_routes", "lab", "--no-browser", "--port", "0", "--store", str(kept)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=os.environ) as served:
         assert served.stdout is not None
         yield served.stdout.readline().split()[0].rstrip("/")
