@@ -9,7 +9,7 @@ import param
 
 from gradient_routes.bench.cases.column import Row as Columns
 from gradient_routes.bench.execution.isolation.channel import Job
-from gradient_routes.bench.execution.isolation.messages import Ended, Message
+from gradient_routes.bench.execution.isolation.messages import Message
 from gradient_routes.bench.lab import inverted
 from gradient_routes.bench.lab.inverter_figures import Figures
 from gradient_routes.bench.lab.part import Part, written
@@ -163,22 +163,17 @@ class Inverter(Part):
     def take(self, message: Message) -> None:
         if isinstance(message, Row):
             self._new.setdefault(message.value["table"], []).append(message.value)
-            if message.value["table"] == "tradeoff":
+            if len(self._new["estimates"]) == N:  # the last row of an inversion, or one of redrawn noise
                 self._draw()
 
-    def end(self, end: Ended, code: int) -> None:
-        self._draw()
-
     def _draw(self) -> None:
-        if not self._new["estimates"]:  # it was refused: the status says why
-            return
         self._steps, self._estimates, self._trades = (
             self._new[name] for name in ("inversion", "estimates", "tradeoff")
         )
         trade = inverted.nearest(self._trades, self.alpha)
         self.figures.take(self._steps, self._estimates, self._trades, trade)
         self._meter.object = inverted.meter(self._steps)
-        self._verdict.object = f'<p class="verdict" role="status">{html.escape(self._steps[-1]["says"])}</p>'
+        self._verdict.object = f'<p role="status">{html.escape(self._steps[-1]["says"])}</p>'
         self._numbers.object = inverted.numbers(self._estimates, trade)
         self._redrawn.visible = bool(self._trades)
         self._spread.object = "" if trade is None else SPREAD.format(**trade)
