@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
-from bokeh.models import HoverTool, Legend
+from bokeh.models import HoverTool, Legend, Range1d
 from bokeh.plotting import figure
 
 from gradient_routes.bench.render.style import of_route
@@ -41,3 +42,17 @@ def plot(
     if hover:
         drawn.add_tools(HoverTool(tooltips=[*hover]))
     return drawn
+
+
+def span(axis: Range1d, values: Iterable[float | None], log: bool = False, margin: float = 0.06) -> None:
+    """Let an axis show all values; those that are no numbers, or have no logarithm, are left out."""
+    found = [v for v in values if v is not None and math.isfinite(v) and (v > 0.0 or not log)]
+    if not found:
+        return
+    low, high = min(found), max(found)
+    if log:
+        wide = max((high / low) ** margin, 1.5)
+        axis.start, axis.end = low / wide, high * wide
+    else:
+        wide = margin * (high - low) or margin * abs(high) or 1.0
+        axis.start, axis.end = low - wide, high + wide

@@ -69,29 +69,6 @@ def nearest(trades: Sequence[Row], alpha: float) -> Row | None:
     return min(trades, key=lambda row: abs(math.log(row["alpha"] / alpha)) if alpha else row["alpha"])
 
 
-def span(values: Sequence[float], least: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
-    """Of an axis that shows values, `least` and 0, with a margin.
-
-    >>> span([1.0]), span([0.1, NOTHING], (-0.2, 0.4))
-    ((-0.1, 1.1), (-0.26, 0.46))
-    """
-    seen = [*least, *(v for v in values if math.isfinite(v))]
-    low, high = min(seen), max(seen)
-    margin = 0.1 * ((high - low) or 1.0)
-    return low - margin, high + margin
-
-
-def decades(values: Sequence[float]) -> tuple[float, float]:
-    """Of a logarithmic axis that shows positive values.
-
-    >>> decades([0.02, 3.0])
-    (0.01, 10.0)
-    """
-    if not values:
-        return 0.1, 10.0
-    return 10.0 ** math.floor(math.log10(min(values))), 10.0 ** math.ceil(math.log10(max(values)) + 1e-9)
-
-
 def numbers(estimates: Sequence[Row], trade: Row | None) -> str:
     """The same as a table."""
     columns, spread = elements(estimates), bars(estimates, trade)

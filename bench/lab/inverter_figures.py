@@ -11,7 +11,7 @@ from bokeh.plotting import figure
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.lab import inverted
-from gradient_routes.bench.lab.drawing import INK, colour, plot
+from gradient_routes.bench.lab.drawing import INK, colour, plot, span
 
 LEFT = 78  # [px] of every figure, so that elements stand above each other
 MODULI = -0.3, 0.5  # log E that are always in view, so that bars and not axes move
@@ -66,16 +66,13 @@ class Figures:
         of, squares = self.elements.data, [v for name in LOOKS for v in self.trades.data[name] if v > 0.0]
         moduli = [*of["estimate"], *of["truth"], *self.bars.data["low"], *self.bars.data["high"]]
         u, lam, product = self.strains
-        for axis, (start, end) in {
-            self.moduli.y_range: inverted.span(moduli, MODULI),
-            u.y_range: inverted.span(of["strain"]),
-            lam.y_range: inverted.span(of["adjoint_strain"]),
-            product.y_range: inverted.span([*of["product"], *of["gradient"]]),
-            self.cost.x_range: (0.0, 1.05 * max(self.path.data["solves"], default=1.0)),
-            self.cost.y_range: inverted.decades(self.path.data["misfit"]),
-            self.tradeoff.y_range: inverted.decades(squares),
-        }.items():
-            axis.update(start=start, end=end)
+        span(self.moduli.y_range, [*moduli, *MODULI])
+        span(u.y_range, [*of["strain"], 0.0])
+        span(lam.y_range, [*of["adjoint_strain"], 0.0])
+        span(product.y_range, [*of["product"], *of["gradient"], 0.0])
+        span(self.cost.x_range, [*self.path.data["solves"], 0.0])
+        span(self.cost.y_range, self.path.data["misfit"], log=True)
+        span(self.tradeoff.y_range, squares, log=True)
 
     def _aligned(self, y: str, legend: bool = False, **options: Any) -> figure:
         drawn = plot("", y, x_range=self.along, min_border_left=LEFT, **{"y_range": (-1.0, 1.0), **options})

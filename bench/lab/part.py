@@ -26,6 +26,7 @@ from gradient_routes.bench.lab.shell import Command, Exited, Said
 from gradient_routes.problems.errors import InputError
 
 WRONG_USAGE = 2
+TOGETHER = 10  # [ms] in which changes are gathered: every message to a browser has its price
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ class Part(param.Parameterized):
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
         self._moves, self.pushed = 0, nothing
+        self._changes: list[Callable[[], None]] = []
         self._following: asyncio.Task[None] | None = None
         self._refused = self._read(query or {})
         self.param.watch(self._changed, self.fields)
@@ -140,7 +142,8 @@ class Part(param.Parameterized):
 
     def _changed(self, *_: Any) -> None:
         self._refused = []
-        self._show()
+        with pn.io.hold(self._document):
+            self._show()
         if self.at_once:
             self.start()
 
@@ -214,12 +217,20 @@ class Part(param.Parameterized):
         self.end(end, code)
 
     def _later(self, change: Callable[..., None], *arguments: Any) -> None:
-        """Change what is shown, in the turn of its document where there is one."""
+        """Change what is shown, in the turn of its document where there is one: all that has come by then together."""
         if self._document is None or self._document.session_context is None:
             change(*arguments)
             self.pushed()
-        else:
-            self._document.add_next_tick_callback(partial(change, *arguments))
+            return
+        self._changes.append(partial(change, *arguments))
+        if len(self._changes) == 1:
+            self._document.add_timeout_callback(self._change, TOGETHER)
+
+    def _change(self) -> None:
+        changes, self._changes = self._changes, []
+        with pn.io.hold(self._document):  # one message to the browser
+            for change in changes:
+                change()
 
 
 def nothing() -> None:

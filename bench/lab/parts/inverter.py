@@ -9,7 +9,7 @@ import param
 
 from gradient_routes.bench.cases.column import Row as Columns
 from gradient_routes.bench.execution.isolation.channel import Job
-from gradient_routes.bench.execution.isolation.messages import Ended, Message
+from gradient_routes.bench.execution.isolation.messages import Message
 from gradient_routes.bench.lab import inverted
 from gradient_routes.bench.lab.inverter_figures import Figures
 from gradient_routes.bench.lab.part import Part, written
@@ -114,13 +114,18 @@ class Inverter(Part):
     def _controls(self) -> pn.Column:
         params = self.param
         sensors = pn.widgets.CheckButtonGroup.from_param(params.sensors, options=[*range(1, N + 1)])
-        selects = [
-            pn.widgets.Select.from_param(params.optimizer, width=140),
-            pn.widgets.Select.from_param(params.stop_at, name="stop beyond the tip", width=140),
-            pn.widgets.FloatSlider.from_param(params.gap, start=0.5, end=1.2, step=0.01, name="gap [m]", width=170),
-            pn.widgets.IntInput.from_param(params.seed, name="seed of the noise", width=110),
+        select = pn.widgets.Select.from_param
+        gap = pn.widgets.FloatSlider.from_param(params.gap, start=0.5, end=1.2, step=0.01, name="Gap [m]", width=150)
+        choices = [
+            self._logarithmic("noise", "Noise [m]", -5, -1),
+            pn.widgets.IntInput.from_param(params.seed, name="Seed of it", width=90),
+            self._logarithmic("alpha", "Weight α of Φ", -9, 0),
+            select(params.optimizer, name="Optimizer", width=130),
+            select(params.stop_at, name="Stop beyond the tip", description=None, width=140),
+            gap,
         ]
-        sliders = [self._logarithmic("noise", "noise [m]", -5, -1), self._logarithmic("alpha", "alpha", -9, 0)]
+        params.stop_at.rx.watch(lambda stop: setattr(gap, "disabled", stop == "none"))
+        gap.disabled = self.stop_at == "none"
         moves = {
             "step back": lambda: self.iterate(self._at - 1),
             "step": lambda: self.iterate(self._at + 1),
@@ -130,16 +135,14 @@ class Inverter(Part):
         }
         buttons = [pn.widgets.Button(name=name, on_click=lambda _, move=move: move()) for name, move in moves.items()]
         label = pn.pane.HTML("<p>Sensors at nodes</p>", width=140)
-        return pn.Column(
-            pn.FlexBox(label, sensors, align_items="center"), pn.FlexBox(*sliders, *selects), pn.FlexBox(*buttons)
-        )
+        return pn.Column(pn.FlexBox(label, sensors, align_items="center"), pn.FlexBox(*choices), pn.FlexBox(*buttons))
 
     def _logarithmic(self, field: str, name: str, least: int, most: int) -> pn.widgets.DiscreteSlider:
         """0, then 1, 2 and 5 of every decade, and what the URL says."""
         decades = [float(f"{d}e{k}") for k in range(least, most) for d in (1, 2, 5)]
         values = sorted({0.0, *decades, 10.0**most, getattr(self, field)})
         slider = pn.widgets.DiscreteSlider(
-            name=name, options={f"{v:g}": v for v in values}, value=getattr(self, field), width=220
+            name=name, options={f"{v:g}": v for v in values}, value=getattr(self, field), width=190
         )
         slider.param.watch(lambda move: setattr(self, field, move.new), "value")
         return slider
@@ -163,22 +166,17 @@ class Inverter(Part):
     def take(self, message: Message) -> None:
         if isinstance(message, Row):
             self._new.setdefault(message.value["table"], []).append(message.value)
-            if message.value["table"] == "tradeoff":
+            if len(self._new["estimates"]) == N:  # the last row of an inversion, or one of redrawn noise
                 self._draw()
 
-    def end(self, end: Ended, code: int) -> None:
-        self._draw()
-
     def _draw(self) -> None:
-        if not self._new["estimates"]:  # it was refused: the status says why
-            return
         self._steps, self._estimates, self._trades = (
             self._new[name] for name in ("inversion", "estimates", "tradeoff")
         )
         trade = inverted.nearest(self._trades, self.alpha)
         self.figures.take(self._steps, self._estimates, self._trades, trade)
         self._meter.object = inverted.meter(self._steps)
-        self._verdict.object = f'<p class="verdict" role="status">{html.escape(self._steps[-1]["says"])}</p>'
+        self._verdict.object = f'<p role="status">{html.escape(self._steps[-1]["says"])}</p>'
         self._numbers.object = inverted.numbers(self._estimates, trade)
         self._redrawn.visible = bool(self._trades)
         self._spread.object = "" if trade is None else SPREAD.format(**trade)
