@@ -6,7 +6,7 @@ import asyncio
 import math
 import threading
 import time
-from collections.abc import AsyncGenerator, Iterator
+from collections.abc import AsyncGenerator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -45,6 +45,11 @@ class Lane:
 
 QUICK = Lane(workers=2, timeout=20.0)
 LONG = Lane(workers=1, timeout=300.0, patience=10)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A process works on the job now."""
 
 
 class Over(Exception):
@@ -117,20 +122,27 @@ class Pool:
     """The workers of a lane. Jobs wait for a free one in the order in which they came."""
 
     def __init__(self, lane: Lane) -> None:
-        self.lane, self.waiting = lane, 0
+        self.lane = lane
+        self._queue: list[Callable[[int], None]] = []
         self._threads = ThreadPoolExecutor(lane.workers)
         self._all = [Worker(lane) for _ in range(lane.workers)]
         self._idle: asyncio.Queue[Worker] = asyncio.Queue()
         for worker in self._all:
             self._idle.put_nowait(worker)
 
-    async def messages(self, job: Job) -> AsyncGenerator[Message]:
-        """Those of a job as they come, Ended last. Closed early, it ends the job."""
-        self.waiting += 1
+    async def messages(self, job: Job, told: Callable[[int], None] = lambda before: None) -> AsyncGenerator[Message]:
+        """Those of a job as they come, Begun first, Ended last. Closed early, it ends the job.
+
+        told  is called with the number of jobs that wait or run before it, whenever that changes
+        """
+        self._queue.append(told)
+        self._tell()
         try:
             worker = await self._idle.get()
         finally:
-            self.waiting -= 1
+            self._queue.remove(told)
+            self._tell()
+        yield Begun()
         loop, heard = asyncio.get_running_loop(), asyncio.Queue[Message]()
 
         def listen() -> None:
@@ -147,6 +159,11 @@ class Pool:
             worker.leave()
             await listening
             self._idle.put_nowait(worker)
+
+    def _tell(self) -> None:
+        if self._idle.empty():
+            for before, told in enumerate(self._queue, start=self.lane.workers):
+                told(before)
 
     def warm(self) -> None:
         """Start the processes, without waiting for them."""
