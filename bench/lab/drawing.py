@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Iterable
 from typing import Any
 
-from bokeh.models import HoverTool, Legend, Range1d
+from bokeh.models import HoverTool, Legend, Range1d, SaveTool
 from bokeh.plotting import figure
 
+from gradient_routes.bench.cases.selector import bare
 from gradient_routes.bench.render.style import of_route
 
 LABELS = ".bk-label { color: var(--ink, inherit) !important }"  # a legend is no canvas: --bk-* do not reach it
 INK = "#7d858e"  # seen on paper and at night
+QUARTER = math.pi / 2.0
+MARKERS = {  # of style.py -> those of Bokeh, turned by an angle
+    "triangle-down": ("inverted_triangle", 0.0),
+    "triangle-up": ("triangle", 0.0),
+    "triangle-right": ("triangle", -QUARTER),
+    "triangle-left": ("triangle", QUARTER),
+    "cross": ("plus", 0.0),
+}
+SIGNS = {
+    "triangle-down": "\u25bc", "triangle-up": "\u25b2", "triangle-right": "\u25b6", "triangle-left": "\u25c0",
+    "cross": "\u271a", "diamond": "\u25c6", "square": "\u25a0", "circle": "\u25cf",
+}  # fmt: skip
 
 
 def colour(route: str) -> str:
     """That of a route, to be seen on paper and at night."""
-    return of_route(route).light
+    return of_route(bare(route)).light
 
 
 def plot(
@@ -44,6 +58,19 @@ def plot(
     return drawn
 
 
+def marker(route: str) -> tuple[str, float]:
+    """That of a route, as Bokeh names it, and the angle by which it is turned."""
+    name = of_route(bare(route)).marker
+    return MARKERS.get(name, (name, 0.0))
+
+
+def swatch(route: str, said: str = "") -> str:
+    """The name of a route, or what is said in its place, behind its marker, in HTML: a legend."""
+    style = of_route(bare(route))
+    ink, sign = f"color: light-dark({style.light}, {style.dark})", SIGNS[style.marker]
+    return f'<span aria-hidden="true" style="{ink}">{sign}</span> {html.escape(said or route)}'
+
+
 def span(axis: Range1d, values: Iterable[float | None], log: bool = False, margin: float = 0.06) -> None:
     """Let an axis show all values; those that are no numbers, or have no logarithm, are left out."""
     found = [v for v in values if v is not None and math.isfinite(v) and (v > 0.0 or not log)]
@@ -56,3 +83,10 @@ def span(axis: Range1d, values: Iterable[float | None], log: bool = False, margi
     else:
         wide = margin * (high - low) or margin * abs(high) or 1.0
         axis.start, axis.end = low - wide, high + wide
+
+
+def offer_picture(drawn: figure, name: str) -> figure:
+    """The figure with a button that saves it as NAME.png, as the browser draws it."""
+    drawn.add_tools(SaveTool(filename=name))
+    drawn.toolbar_location, drawn.toolbar.logo = "right", None
+    return drawn

@@ -18,8 +18,11 @@ def text(name: str) -> str:
 
 
 def inside(part: Part) -> pn.Column:
-    """The part with its command and its state, for a page or a cell of a notebook."""
-    column = pn.Column(part.content(), part.status, part.shown, sizing_mode="stretch_width")
+    """The part with its command and its state, below unless it shows them itself, for a page or a notebook."""
+    content = part.content()
+    shown = content.select()
+    below = [pane for pane in (part.status, part.shown) if pane not in shown]
+    column = pn.Column(content, *below, sizing_mode="stretch_width")
     for seen in column.select(lambda part: isinstance(part, pn.pane.HTML | pn.widgets.Widget)):
         seen.stylesheets = [*seen.stylesheets, text("inside.css")]
     return column

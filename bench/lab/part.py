@@ -21,7 +21,7 @@ from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.command_options import STORE
 from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
-from gradient_routes.bench.lab.pool import Pool
+from gradient_routes.bench.lab.pool import Begun, Pool
 from gradient_routes.bench.lab.shell import Command, Exited, Said
 from gradient_routes.problems.errors import InputError
 
@@ -49,13 +49,13 @@ class Part(param.Parameterized):
     """Its state are its parameters: numbers, choices, switches, lists of numbers. A change computes the command anew.
 
     A part declares them, writes `command`, `content` and `take`, and draws what arrives. The newest state wins: those
-    that were left while a command ran are skipped. Where `at_once` is False it runs at `start` only, until `stop`.
+    that were left while a command ran are skipped. Where `at_once` is False it runs at `start` only, in the long lane,
+    until `stop`.
     """
 
     slug: ClassVar[str]
     title: ClassVar[str]
     lead: ClassVar[str]
-    at_once: ClassVar[bool] = True
 
     def __init__(self, place: Place, query: Mapping[str, str] | None = None) -> None:
         super().__init__()
@@ -74,6 +74,11 @@ class Part(param.Parameterized):
 
     # what a part writes
 
+    @property
+    def at_once(self) -> bool:
+        """Whether the state, as it is now, is computed as soon as it changes."""
+        return True
+
     def command(self) -> tuple[str, ...]:
         """The arguments of `routes` that compute what is shown. Raises InputError where the state has none."""
         raise NotImplementedError
@@ -89,6 +94,10 @@ class Part(param.Parameterized):
     def content(self) -> pn.viewable.Viewable:
         """What is seen. Asked for once."""
         raise NotImplementedError
+
+    def queue(self, before: int) -> None:
+        """The job waits; so many are before it."""
+        self.say(f"waiting: {before} before you", bad=False)
 
     def begin(self) -> None:
         """A job begins."""
@@ -193,11 +202,12 @@ class Part(param.Parameterized):
     async def _run(self, job: Job) -> None:
         said: list[str] = []
         code = 0
-        self._later(self.begin)
         try:
-            async with aclosing(self.pool().messages(job)) as messages:
+            async with aclosing(self.pool().messages(job, partial(self._later, self.queue))) as messages:
                 async for message in messages:
                     match message:
+                        case Begun():
+                            self._later(self.begin)
                         case Said(text):
                             said.append(text.removeprefix("routes: "))
                         case Exited(code):

@@ -6,7 +6,7 @@ import asyncio
 import math
 import threading
 import time
-from collections.abc import AsyncGenerator, Iterator
+from collections.abc import AsyncGenerator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -45,6 +45,11 @@ class Lane:
 
 QUICK = Lane(workers=2, timeout=20.0)
 LONG = Lane(workers=1, timeout=300.0, patience=10)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A process works on the job now."""
 
 
 class Over(Exception):
@@ -133,19 +138,25 @@ class Pool:
     """The workers of a lane. Jobs wait for a free one in the order in which they came."""
 
     def __init__(self, lane: Lane) -> None:
-        self.lane, self.waiting = lane, 0
+        self.lane = lane
+        self._queue: list[Callable[[int], None]] = []
         self._threads = ThreadPoolExecutor(lane.workers)
         self._all = [Worker(lane) for _ in range(lane.workers)]
         self._free = [*self._all]
         self._turns = asyncio.Semaphore(lane.workers)
 
-    async def messages(self, job: Job) -> AsyncGenerator[Message]:
-        """Those of a job as they come, Ended last. Closed early, it ends the job."""
-        self.waiting += 1
+    async def messages(self, job: Job, told: Callable[[int], None] = lambda before: None) -> AsyncGenerator[Message]:
+        """Those of a job as they come, Begun first, Ended last. Closed early, it ends the job.
+
+        told  is called with the number of jobs that wait or run before it, whenever that changes
+        """
+        self._queue.append(told)
+        self._tell()
         try:
             await self._turns.acquire()
         finally:
-            self.waiting -= 1
+            self._queue.remove(told)
+            self._tell()
         worker = self._free.pop()  # the one that ended last: it may remember what it has read
         worker.wanted()
         loop, heard = asyncio.get_running_loop(), asyncio.Queue[Message]()
@@ -168,12 +179,18 @@ class Pool:
 
         loop.run_in_executor(self._threads, listen).add_done_callback(free)
         try:
+            yield Begun()
             message: Message = None
             while not isinstance(message, Ended):
                 message = await heard.get()
                 yield message
         finally:
             worker.leave()
+
+    def _tell(self) -> None:
+        if self._turns.locked():
+            for before, told in enumerate(self._queue, start=self.lane.workers):
+                told(before)
 
     def warm(self) -> None:
         """Start the processes, without waiting for them."""

@@ -14,6 +14,7 @@ from typing import Any, cast
 import click
 
 from gradient_routes.bench.cases import registry
+from gradient_routes.bench.cases.folder import from_here
 from gradient_routes.bench.execution.isolation.channel import Channel, Job, ended
 from gradient_routes.bench.execution.isolation.messages import Ended
 from gradient_routes.bench.studies.command import command_of
@@ -64,7 +65,7 @@ class Command:
             Lines(lambda line: channel.say(Row(json.loads(line)))),
             Lines(lambda line: channel.say(Said(line))),
         )
-        with redirect_stdout(rows), redirect_stderr(notes):
+        with redirect_stdout(rows), redirect_stderr(notes), from_here():
             try:
                 code = command.main([*self.arguments[1:], *QUIETLY], f"routes {self.name}", standalone_mode=False)
             except click.UsageError as error:

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 PARTS = {  # slug -> class in the module of that name
     "derivation": "Derivation",
     "inverter": "Inverter",
+    "laboratory": "Laboratory",
+    "own-data": "OwnData",
     "store": "KeptRows",
     "which-route": "WhichRoute",
 }

@@ -72,7 +72,7 @@ class WhichRoute(Part):
         return Advise(answers_of(**given | {"budget": math.inf if self.budget is None else self.budget}))
 
     def content(self) -> pn.Column:
-        self._answer, self._bills, self._changes = (
+        self._answer, self._bills, self._alternatives = (
             pn.pane.HTML("", sizing_mode="stretch_width", min_height=60) for _ in range(3)
         )
         self._curves = ColumnDataSource({name: [] for name in ("n_p", *OF_ROUTES)})
@@ -87,7 +87,7 @@ class WhichRoute(Part):
         words = pn.pane.HTML(glossary(), sizing_mode="stretch_width")
         figure = pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
         return pn.Column(
-            self._controls(), self._answer, self._bills, figure, self._changes, words, sizing_mode="stretch_width"
+            self._controls(), self._answer, self._bills, figure, self._alternatives, words, sizing_mode="stretch_width"
         )
 
     def _controls(self) -> pn.Column:
@@ -110,7 +110,7 @@ class WhichRoute(Part):
         if isinstance(message, Row):
             self._answer.object = answer(message.value)
             self._bills.object = bill_table(message.value)
-            self._changes.object = self._change_table(message.value)
+            self._alternatives.object = self._change_table(message.value)
         elif isinstance(message, Curves):
             self._draw(message)
 

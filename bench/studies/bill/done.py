@@ -14,7 +14,7 @@ from gradient_routes.bench.store.keeping import Keeper
 if TYPE_CHECKING:
     from gradient_routes.bench.cases.column import Row
     from gradient_routes.bench.cases.expected import Expectation
-    from gradient_routes.bench.cases.outcome import Outcome
+    from gradient_routes.bench.cases.outcome import Outcome, View
     from gradient_routes.bench.store.store import Store
 
 MOST = 1000
@@ -48,7 +48,7 @@ class Done:
         if len(self.outcomes) < (2 * MOST if failed else MOST) or self._views:
             slim = replace(outcome, row=outcome.row | {"gradient": None}, samples=None, environment=None)
             self.outcomes.append(slim if self._views else replace(slim, view=None, fields=None))
-        self._waiting[outcome.place] = outcome.row
+        self._waiting[outcome.place] = outcome.row | _components(outcome.view)
         while self._next in self._waiting:
             self._print(self._next)
             self._next += 1
@@ -95,3 +95,13 @@ class Done:
     def ordered(self) -> list[Outcome]:
         """The outcomes in the order asked for."""
         return sorted(self.outcomes, key=lambda outcome: outcome.place)
+
+
+def _components(view: View | None) -> Row:
+    """What --gradient adds to a row of --json: names and units of the parameters, p, the reference of every component
+    where there is one.
+    """
+    if view is None:
+        return {}
+    reference = None if view.reference is None else view.reference.gradient.tolist()
+    return {"parameters": view.labels, "units": view.units, "p": view.p.tolist(), "gradient_reference": reference}

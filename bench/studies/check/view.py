@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 
 from gradient_routes.bench.verification.contract import Contract
-from gradient_routes.bench.verification.result import Check
+from gradient_routes.bench.verification.result import Check, rows
 from gradient_routes.bench.verification.view import show_check, show_contract
 
 
@@ -22,4 +22,4 @@ def as_dict(found: Check | Contract) -> dict[str, Any]:
     """What --json prints."""
     if isinstance(found, Contract):
         return {"name": found.name, "findings": [vars(f) | {"sound": f.sound} for f in found.findings]}
-    return found.as_dict()
+    return found.as_dict() | {"points": rows(found, {})["points"]}
