@@ -35,15 +35,13 @@ def lab(port: int, browser: bool, store: Path) -> None:
 
     from gradient_routes.bench.lab.server import Laboratory
 
-    laboratory = Laboratory(port, store=store)
-
     def ready(url: str) -> None:
         echo(f"{url} until Ctrl-C")
         if browser:
             webbrowser.open(url)
 
     try:
-        laboratory.serve(ready)
+        Laboratory(port, store=store).serve(ready)
     except KeyboardInterrupt:
         over()
         complain("interrupted - the laboratory is closed")
