@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -47,4 +48,4 @@ def lab(port: int, browser: bool, store: Path) -> None:
         complain("interrupted - the laboratory is closed")
         leave(INTERRUPTED)
     except OSError as error:
-        raise InputError(f"lab: port {port}: {error.strerror} - name another by --port, or 0") from error
+        raise InputError(f"lab: port {port}: {os.strerror(error.errno or 0)} - name another by --port, or 0") from error
