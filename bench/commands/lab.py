@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -35,18 +36,16 @@ def lab(port: int, browser: bool, store: Path) -> None:
 
     from gradient_routes.bench.lab.server import Laboratory
 
-    laboratory = Laboratory(port, store=store)
-
     def ready(url: str) -> None:
         echo(f"{url} until Ctrl-C")
         if browser:
             webbrowser.open(url)
 
     try:
-        laboratory.serve(ready)
+        Laboratory(port, store=store).serve(ready)
     except KeyboardInterrupt:
         over()
         complain("interrupted - the laboratory is closed")
         leave(INTERRUPTED)
     except OSError as error:
-        raise InputError(f"lab: port {port}: {error.strerror} - name another by --port, or 0") from error
+        raise InputError(f"lab: port {port}: {os.strerror(error.errno or 0)} - name another by --port, or 0") from error

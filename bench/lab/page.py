@@ -6,6 +6,8 @@ from functools import cache
 from importlib.resources import files
 
 import panel as pn
+from bokeh.document import Document
+from panel.io.location import Location
 
 from gradient_routes.bench.lab.part import Part
 from gradient_routes.bench.lab.parts import PARTS, load
@@ -28,9 +30,19 @@ def inside(part: Part) -> pn.Column:
     return column
 
 
+class Whole(pn.Template):
+    """A page whose models are counted once, not after every one of them."""
+
+    def server_doc(
+        self, doc: Document | None = None, title: str | None = None, location: bool | Location = True
+    ) -> Document:
+        with (doc or pn.state.curdoc).models.freeze():
+            return super().server_doc(doc, title, location)
+
+
 def page(part: Part) -> pn.Template:
     """The whole page of a part."""
-    template = pn.Template(text("page.html"), location=True)
+    template = Whole(text("page.html"), location=True)
     for name, value in {
         "css": text("lab.css"), "js": text("page.js"), "here": part.slug, "lead": part.lead, "heading": part.title,
         "parts": [(slug, load(slug).title) for slug in PARTS],

@@ -27,6 +27,7 @@ from gradient_routes.bench.lab.parts import PARTS, load
 from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
 
 LOOPBACK = "127.0.0.1"
+REFUSALS = ("tornado.access", "bokeh.server.views.ws")  # they are told to who asked
 UPLOAD = 20 * 2**20  # [byte] of one message of a page, files included
 IDLE = 60_000  # [ms] after which the session of a page that was closed ends
 
@@ -36,10 +37,12 @@ class Laboratory:
 
     address, port  where it listens
     store          that is looked at
+
+    Raises OSError for a port in use.
     """
 
     def __init__(self, port: int, address: str = LOOPBACK, store: Path = STORE) -> None:
-        self.port, self.address = port or free_port(address), address
+        self.port, self.address = free_port(address, port), address
         self.store = store
         self.pools = Pool(QUICK), Pool(LONG)
 
@@ -68,8 +71,9 @@ class Laboratory:
         """Serve until SIGINT or SIGTERM; `ready` is called with the address. Raises OSError for a port in use, at the
         end KeyboardInterrupt.
         """
-        logging.basicConfig(level=logging.WARNING, format="routes lab: %(name)s: %(message)s")
-        logging.getLogger("tornado.access").setLevel(logging.ERROR)  # what is refused is told to who asked
+        logging.basicConfig(level=logging.WARNING, format="routes lab: %(name)s: %(message)s", force=True)
+        for name in REFUSALS:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         with ExitStack() as closing:
             self.root = Path(
                 closing.enter_context(TemporaryDirectory(prefix="routes-lab-", ignore_cleanup_errors=True))
@@ -129,7 +133,7 @@ class Refused(RequestHandler):
         raise HTTPError(403)
 
 
-def free_port(address: str) -> int:
-    """One that nobody listens on now."""
-    with socket.create_server((address, 0)) as found:
+def free_port(address: str, port: int = 0) -> int:
+    """This one, for 0 any, that nobody listens on now. Raises OSError where it is in use."""
+    with socket.create_server((address, port)) as found:
         return int(found.getsockname()[1])

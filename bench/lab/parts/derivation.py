@@ -103,7 +103,7 @@ class Derivation(Part):
         ]  # fmt: skip
 
         def move(_: object) -> None:
-            self.octaves = [slider.value for slider in sliders]
+            self.octaves = [float(slider.value) for slider in sliders]  # 0 comes as an integer
 
         for slider in sliders:
             slider.param.watch(move, "value")
