@@ -100,7 +100,7 @@ def meter(steps: Sequence[Row]) -> str:
         "α Φ": number(last["regularization"]),
         "|dJ/dp|": number(last["gradient_norm"]),
         **({} if noise is None else {"misfit / noise": number(noise)}),
-        **({} if off is None else {"off, of the start": number(off)}),
+        **({} if off is None else {"off (start: 1)": number(off)}),
     }
     terms = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in told.items())
     return f'<dl class="meter">{terms}</dl>'

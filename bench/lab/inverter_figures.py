@@ -8,6 +8,7 @@ from typing import Any
 from bokeh.events import Tap
 from bokeh.models import BasicTicker, BasicTickFormatter, ColumnDataSource, FixedTicker, Range1d, Whisker
 from bokeh.plotting import figure
+from bokeh.transform import dodge
 
 from gradient_routes.bench.cases.column import Row
 from gradient_routes.bench.lab import inverted
@@ -70,7 +71,7 @@ class Figures:
         span(u.y_range, [*of["strain"], 0.0])
         span(lam.y_range, [*of["adjoint_strain"], 0.0])
         span(product.y_range, [*of["product"], *of["gradient"], 0.0])
-        span(self.cost.x_range, [*self.path.data["solves"], 0.0])
+        span(self.cost.x_range, [*self.path.data["solves"], 0.0, 1.0])
         span(self.cost.y_range, self.path.data["misfit"], log=True)
         span(self.tradeoff.y_range, squares, log=True)
 
@@ -91,8 +92,8 @@ class Figures:
         drawn.hbar([0.0], left=[0.5], right=[n + 0.5], height=0.5, color=INK, fill_alpha=0.25)
         drawn.segment([0.5], [-0.8], [0.5], [0.8], color=INK, line_width=5)
         drawn.segment("x", -0.8, "x", 0.8, source=self.stop, color=colour("fd-one-sided"), line_width=5)
-        drawn.scatter("x", 0.0, source=self.nodes, size=19, color=INK, fill_color="white")
-        drawn.scatter("x", 0.0, source=self.nodes, size=13, color=ADJOINT, alpha="look")
+        drawn.scatter("x", 0.0, source=self.nodes, size=11, color=INK, fill_alpha=0.2, line_width=2)
+        drawn.scatter("x", 0.0, source=self.nodes, size=20, color=ADJOINT, alpha="look")
         drawn.text("x", -0.95, "node", source=self.nodes, color=INK, text_align="center", text_font_size="11px")
         drawn.text([n + 0.62], [0.0], ["F →"], color=INK, text_baseline="middle")
         drawn.axis.visible, drawn.ygrid.visible, drawn.outline_line_color = False, False, None
@@ -111,9 +112,10 @@ class Figures:
             "e", 0.7, "estimate", source=self.elements, color=ADJOINT, fill_alpha=0.5, legend_label="estimate",
             hatch_pattern="hatch", hatch_color="white", hatch_alpha=0.9,
         )  # fmt: skip
-        drawn.scatter(
-            "e", "truth", source=self.elements, marker="dash", size=44, color=INK, line_width=4, legend_label="truth"
-        )
+        drawn.segment(
+            dodge("e", -0.3), "truth", dodge("e", 0.3), "truth", source=self.elements, color=INK, line_width=4,
+            legend_label="truth",
+        )  # fmt: skip
         drawn.scatter("e", "centre", source=self.bars, marker="diamond", size=8, color=colour("fd-central"))
         whisker = Whisker(base="e", lower="low", upper="high", source=self.bars, line_color=colour("fd-central"))
         whisker.line_width = 2

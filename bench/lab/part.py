@@ -26,6 +26,7 @@ from gradient_routes.bench.lab.shell import Command, Exited, Said
 from gradient_routes.problems.errors import InputError
 
 WRONG_USAGE = 2
+NONE = "none"  # a list without items: a browser leaves out what is empty
 TOGETHER = 10  # [ms] in which changes are gathered: every message to a browser has its price
 
 
@@ -252,7 +253,7 @@ def written(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
-        return ",".join(map(written, value))
+        return ",".join(map(written, value)) or NONE
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
@@ -269,5 +270,5 @@ def read(declared: param.Parameter, text: str) -> Any:
             return None if text == "None" else float(text)
         case param.List():
             kind = declared.item_type or str
-            return [kind(item) for item in text.split(",") if item]
+            return [kind(item) for item in text.split(",") if item] if text != NONE else []
     return text

@@ -56,7 +56,7 @@ class Derivation(Part):
 
     @property
     def selector(self) -> str:
-        return f"bar[sensors={written(sorted(self.sensors)) or 0}]"
+        return f"bar[sensors={written(sorted(self.sensors) or [0])}]"
 
     @property
     def at(self) -> str:

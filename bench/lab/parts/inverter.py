@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import shlex
 
 import panel as pn
 import param
@@ -25,6 +26,10 @@ STOPS = ["none", "penalty", "softplus", "quadratic", "multiplier"]
 READ = """<p><b>Bars</b>: estimates at iterate k, 0 being the start. <b>Dashes</b>: the truth. <b>Hatched</b>: blind, no
     datum depends on the element. Below them what the gradient is made of: A L E times the strain of u times that of λ;
     diamonds are the whole of dJ/d log E, with the share of α Φ.</p>"""
+
+SPREAD = """<h2>The same with {draws} draws of the noise</h2><p>Whiskers above: mean and standard deviation of their
+    estimates at α = {alpha:g}. Bias is what Φ and blindness do, variance is what noise does. The bars are those of
+    <code>{once}</code>.</p>"""
 
 
 class Inverter(Part):
@@ -49,7 +54,7 @@ class Inverter(Part):
     def selector(self, alpha: float) -> str:
         """The bar of this state, as --problem takes it."""
         given = {"noise": self.noise, "seed": self.seed, "alpha": alpha}
-        options = [f"sensors={written(sorted(self.sensors)) or 0}"]
+        options = [f"sensors={written(sorted(self.sensors) or [0])}"]
         options += [f"{name}={written(value)}" for name, value in given.items() if value]
         if self.stop_at != "none":
             options += [f"stop={self.stop_at}", f"gap={written(self.gap)}"]
@@ -162,6 +167,8 @@ class Inverter(Part):
 
     def begin(self) -> None:
         self._new: dict[str, list[Columns]] = {"inversion": [], "estimates": [], "tradeoff": []}
+        if self.draws:
+            self.say("redrawing the noise, from the largest weight to the least; any change ends it", bad=False)
 
     def take(self, message: Message) -> None:
         if isinstance(message, Row):
@@ -179,8 +186,5 @@ class Inverter(Part):
         self._verdict.object = f'<p role="status">{html.escape(self._steps[-1]["says"])}</p>'
         self._numbers.object = inverted.numbers(self._estimates, trade)
         self._redrawn.visible = bool(self._trades)
-        self._spread.object = "" if trade is None else SPREAD.format(**trade)
-
-
-SPREAD = """<h2>The same with {draws} draws of the noise</h2><p>Whiskers above: mean and standard deviation of the
-    estimates at &alpha; = {alpha:g}. Bias is what &Phi; and blindness do, variance is what noise does.</p>"""
+        once = html.escape(f"routes {shlex.join(self._once())}")
+        self._spread.object = "" if trade is None else SPREAD.format(**trade, once=once)
