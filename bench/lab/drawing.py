@@ -87,6 +87,8 @@ def span(axis: Range1d, values: Iterable[float | None], log: bool = False, margi
 
 def offer_picture(drawn: figure, name: str) -> figure:
     """The figure with a button that saves it as NAME.png, as the browser draws it."""
+    for hover in drawn.select(HoverTool):
+        hover.visible = False
     drawn.add_tools(SaveTool(filename=name))
     drawn.toolbar_location, drawn.toolbar.logo = "right", None
     return drawn

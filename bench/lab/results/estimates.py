@@ -100,10 +100,12 @@ def said(steps: Sequence[dict[str, Any]], fits: Sequence[dict[str, Any]]) -> str
         kind = "good" if fit["verdict"] == "explained" else "bad"
         noise = "" if fit["noise"] is None else f", noise {number(fit['noise'], 2)} ({html.escape(fit['noise_source'])})"
         chi2 = "" if fit["chi2"] is None else f", chi<sup>2</sup> per datum {number(fit['chi2'], 3)}"
+        mark = f'<span aria-hidden="true">{"✓" if kind == "good" else "✗"}</span>'
+        word = f'<span class="verdict {kind}">{html.escape(fit["verdict"])}</span>'
+        rms = number(fit["rms"], 2)
         lines.append(
-            f'<p id="fit"><span aria-hidden="true">{"✓" if kind == "good" else "✗"}</span> the data are <span class='
-            f'"verdict {kind}">{html.escape(fit["verdict"])}</span>: {fit["data"]} data, rms of residuals '
-            f"{number(fit['rms'], 2)}{noise}{chi2}</p>"
+            f'<p id="fit">{mark} {"the data are " if kind == "good" else ""}{word}: {fit["data"]} data, rms of residuals '
+            f"{rms}{noise}{chi2}</p>"
         )
     return f'<div class="judged" role="status">{"".join(lines)}</div>'
 
