@@ -29,6 +29,7 @@ MODES = {
 }
 RTOL = "1e-12"
 TOLERANCES = (RTOL, "1e-10", "1e-8", "1e-6", "1e-4", "1e-3", "1e-2")
+SOLVERS = {"auto: direct": "auto", "krylov: ends at rtol": "krylov", "descent: ends at rtol": "descent"}
 STEPS = (DEFAULT, *(f"{digit}e-{k}" for k in range(16, 0, -1) for digit in (1, 3)), "1")
 ITERATIONS = (DEFAULT, *map(str, (1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 24, 32, 64, 128, 256, 512)))
 STOPS = ("none", "penalty", "softplus", "quadratic", "multiplier")
@@ -66,7 +67,7 @@ class Laboratory(Part):
     inner = param.Selector(default=DEFAULT, objects=[DEFAULT, "cg", "richardson", "jacobi", "direct"])
     fault = param.Selector(default="sign", objects=[*FAULTS])
     rtol = param.Selector(default=RTOL, objects=[*TOLERANCES])
-    linear_solver = param.Selector(default="auto", objects=["auto", "krylov", "descent", "superlu"])
+    linear_solver = param.Selector(default="auto", objects=[*SOLVERS.values()])
     tip_stop = param.Selector(default="penalty", objects=[*STOPS])
 
     @property
@@ -90,7 +91,7 @@ class Laboratory(Part):
                 return ("unrolling", *self._of(), *inner)
 
     def _of(self, **fixed: str) -> tuple[str, str]:
-        return "--problem", chosen.problem(self.problem, self.options, **fixed)
+        return "--problem", chosen.problem(self.problem, self.options, small=True, **fixed)
 
     def _named(self) -> list[str]:
         """Every route once: `all` stands for those that it names."""
@@ -173,7 +174,7 @@ class Laboratory(Part):
             "inner": select(of.inner, label="Iteration on the tape", **narrow),
             "fault": select(of.fault, label="Fault of faulty-adjoint", **narrow),
             "rtol": select(of.rtol, label="Forward solve to rtol", **narrow),
-            "linear_solver": select(of.linear_solver, label="Linear solver", **narrow),
+            "linear_solver": select(of.linear_solver, label="Linear solver", options=SOLVERS, width=180),
         }
 
     def _fit(self, *_: Any) -> None:
@@ -207,6 +208,9 @@ class Laboratory(Part):
     def begin(self) -> None:
         self._fresh, self._drawn = True, self.mode
         self._running.begin(self.expected)
+
+    def leave(self) -> None:
+        self._running.leave(*self._panels.values())
 
     def queue(self, before: int) -> None:
         super().queue(before)

@@ -24,6 +24,8 @@ MODES = {"invert": "estimate the parameters", "identify": "what the data determi
 PROBLEMS = ("bar", "plate", "rod", "coupon", "block", "heat", "vibrating-bar")  # that take data from files
 OPTIMIZERS = ("lbfgs", "gauss-newton", "levenberg-marquardt", "trust")
 ESTIMATES = "estimates.csv"  # what the command writes
+DROP = """.filepond--panel-root { background: var(--wash); border: 1px dashed var(--edge) }
+.filepond--drop-label { color: var(--ink) } .filepond--credits { display: none }"""
 EXAMPLE, READINGS = "bar_readings.csv", "node,displacement\n1,0.0908\n2,0.1796\n3,0.3256\n4,0.4408\n5,0.5457\n"
 
 
@@ -85,7 +87,7 @@ class OwnData(Part):
         )  # fmt: skip
         self._dropped = pn.widgets.FileDropper(
             multiple=False, max_file_size=f"{upload.MOST // 2**20}MB", label="CSV file", sizing_mode="stretch_width",
-            max_width=460,
+            max_width=460, stylesheets=[DROP],
         )  # fmt: skip
         self._dropped.param.watch(self._keep, "value")
         self._optimizer = pn.widgets.Select.from_param(self.param.optimizer, label="Optimizer", width=150)
@@ -117,15 +119,16 @@ class OwnData(Part):
 
     def _keep(self, event: Any) -> None:
         """A file was dropped, or taken away."""
+        if not event.new:
+            self.data = ""
         for name, content in event.new.items():
             try:
                 kept = upload.keep(self.place.folder, name, content)
             except InputError as error:
                 self.say(str(error))
             else:
-                if kept == self.data:
-                    self._changed()  # another file of that name
                 self.data = kept
+                self.start()
 
     def _estimates(self) -> Path:
         return self.place.folder / ESTIMATES
@@ -136,6 +139,9 @@ class OwnData(Part):
         self._fresh, self._drawn = True, self.mode
         self._take_along.disabled = True
         self._running.begin()
+
+    def leave(self) -> None:
+        self._running.leave(*self._panels.values())
 
     def queue(self, before: int) -> None:
         super().queue(before)

@@ -29,7 +29,7 @@ class Inversion:
         self._residuals = ColumnDataSource(residuals([]))
         self._of_p = plot(
             "parameter", "estimate, its own unit", height=300, x_range=Range1d(0.4, 8.6), y_range=Range1d(-1, 1),
-            title="Estimates with standard deviations; squares: the start; hatched: blind",
+            title="Estimates; squares: start; hatched: blind",
             hover=[("", "@name"), ("estimate", "@estimate"), ("+/-", "@sd"), ("start", "@start")],
         )  # fmt: skip
         self._of_p.vbar(
@@ -43,7 +43,7 @@ class Inversion:
         self._of_p.scatter("x", "estimate", source=self._estimates, color=colour("adjoint"), size=6)
         self._of_r = plot(
             "datum", "(S u - d) / noise", height=240, x_range=Range1d(0.4, 8.6), y_range=Range1d(-3, 3),
-            title="Residuals; band: two standard deviations of the noise",
+            title="Residuals; band: 2 sd of the noise",
             hover=[("", "@name"), ("measured", "@measured"), ("residual", "@residual")],
         )  # fmt: skip
         self._band = BoxAnnotation(bottom=-NOISE, top=NOISE, fill_color=INK, fill_alpha=0.12, line_color=None)
