@@ -29,9 +29,9 @@ def names(kind: registry.Kind) -> list[str]:
     return [*registry.entries(kind)]
 
 
-def problem(name: str, options: str = "", **fixed: str) -> str:
-    """The selector of a problem: its small size, options as text, those of the page. Raises InputError."""
-    text = SMALL.get(name, {}) | _given("problem", name, options, fixed) | fixed
+def problem(name: str, options: str = "", small: bool = False, **fixed: str) -> str:
+    """The selector of a problem: its small size where wanted, options as text, those of the page. Raises InputError."""
+    text = (SMALL.get(name, {}) if small else {}) | _given("problem", name, options, fixed) | fixed
     chosen = _written(name, text)
     case.problems([_written(name, {key: value for key, value in text.items() if key != "data"})])
     return chosen

@@ -53,6 +53,7 @@ def plot(
     )
     legend = Legend(orientation="horizontal", border_line_color=None, background_fill_alpha=0.0, stylesheets=[LABELS])
     drawn.add_layout(legend, "above")
+    drawn.title.text_font_size = "12px"
     if hover:
         drawn.add_tools(HoverTool(tooltips=[*hover]))
     return drawn
@@ -87,6 +88,8 @@ def span(axis: Range1d, values: Iterable[float | None], log: bool = False, margi
 
 def offer_picture(drawn: figure, name: str) -> figure:
     """The figure with a button that saves it as NAME.png, as the browser draws it."""
+    for hover in drawn.select(HoverTool):
+        hover.visible = False
     drawn.add_tools(SaveTool(filename=name))
     drawn.toolbar_location, drawn.toolbar.logo = "right", None
     return drawn

@@ -65,7 +65,7 @@ class Part(param.Parameterized):
         self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
-        self._moves, self.pushed = 0, nothing
+        self._moves, self._waits, self.pushed = 0, False, nothing
         self._changes: list[Callable[[], None]] = []
         self._following: asyncio.Task[None] | None = None
         self._refused = self._read(query or {})
@@ -96,8 +96,12 @@ class Part(param.Parameterized):
         """What is seen. Asked for once."""
         raise NotImplementedError
 
+    def leave(self) -> None:
+        """The state has changed and waits for `start`: what is drawn is that of another one."""
+
     def queue(self, before: int) -> None:
         """The job waits; so many are before it."""
+        self._waits = True
         self.say(f"waiting: {before} before you", bad=False)
 
     def begin(self) -> None:
@@ -156,6 +160,8 @@ class Part(param.Parameterized):
             self._show()
         if self.at_once:
             self.start()
+        else:
+            self.leave()
 
     def _show(self) -> None:
         """The command and the URL of the state."""
@@ -208,7 +214,7 @@ class Part(param.Parameterized):
                 async for message in messages:
                     match message:
                         case Begun():
-                            self._later(self.begin)
+                            self._later(self._begun)
                         case Said(text):
                             said.append(text.removeprefix("routes: "))
                         case Exited(code):
@@ -221,6 +227,12 @@ class Part(param.Parameterized):
             if self._following is asyncio.current_task():  # else a newer one has begun
                 self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
             raise
+
+    def _begun(self) -> None:
+        if self._waits:
+            self._waits = False
+            self.say()
+        self.begin()
 
     def _ended(self, end: Ended, code: int, said: list[str]) -> None:
         failed = end.status is not Status.OK

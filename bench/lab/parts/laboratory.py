@@ -29,6 +29,7 @@ MODES = {
 }
 RTOL = "1e-12"
 TOLERANCES = (RTOL, "1e-10", "1e-8", "1e-6", "1e-4", "1e-3", "1e-2")
+SOLVERS = {"auto: direct": "auto", "krylov: ends at rtol": "krylov", "descent: ends at rtol": "descent"}
 STEPS = (DEFAULT, *(f"{digit}e-{k}" for k in range(16, 0, -1) for digit in (1, 3)), "1")
 ITERATIONS = (DEFAULT, *map(str, (1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 24, 32, 64, 128, 256, 512)))
 STOPS = ("none", "penalty", "softplus", "quadratic", "multiplier")
@@ -45,7 +46,7 @@ OF_ROUTES = {  # controls that are options of some routes
 SHOWN = {  # in a mode
     "gradient": ("routes", "others", "step", "iterations", "inner", "fault", "rtol", "linear_solver"),
     "vcurve": ("judged", "step", "iterations", "inner", "fault", "rtol", "linear_solver"),
-    "kink": ("routes", "stop", "step", "fault", "rtol"),
+    "kink": ("routes", "tip_stop", "step", "fault", "rtol"),
     "unrolling": ("inner",),
 }
 
@@ -53,7 +54,7 @@ SHOWN = {  # in a mode
 class Laboratory(Part):
     """State: what is asked, the problem and its options, the routes and theirs, the solver."""
 
-    slug, title = "laboratory", "Gradient-routes laboratory"
+    slug, title = "laboratory", "Routes to a gradient"
     lead = "Any route on any problem: is its gradient right, and what does it cost?"
 
     mode = param.Selector(default="gradient", objects=[*MODES])
@@ -66,8 +67,8 @@ class Laboratory(Part):
     inner = param.Selector(default=DEFAULT, objects=[DEFAULT, "cg", "richardson", "jacobi", "direct"])
     fault = param.Selector(default="sign", objects=[*FAULTS])
     rtol = param.Selector(default=RTOL, objects=[*TOLERANCES])
-    linear_solver = param.Selector(default="auto", objects=["auto", "krylov", "descent", "superlu"])
-    stop = param.Selector(default="penalty", objects=[*STOPS])
+    linear_solver = param.Selector(default="auto", objects=[*SOLVERS.values()])
+    tip_stop = param.Selector(default="penalty", objects=[*STOPS])
 
     @property
     def at_once(self) -> bool:
@@ -83,14 +84,14 @@ class Laboratory(Part):
             case "vcurve":
                 return ("vcurve", *self._of(), "--route", self._route(self.judged), *self._solver())
             case "kink":
-                fixed = {"stop": self.stop} if self.problem == "bar" else {}
+                fixed = {"stop": self.tip_stop} if self.problem == "bar" else {}
                 return ("kink", *self._of(**fixed), *self._named(), *self._solver(), *SHORT)
             case _:
                 inner = () if self.inner == DEFAULT else ("--inner", self.inner)
                 return ("unrolling", *self._of(), *inner)
 
     def _of(self, **fixed: str) -> tuple[str, str]:
-        return "--problem", chosen.problem(self.problem, self.options, **fixed)
+        return "--problem", chosen.problem(self.problem, self.options, small=True, **fixed)
 
     def _named(self) -> list[str]:
         """Every route once: `all` stands for those that it names."""
@@ -143,16 +144,18 @@ class Laboratory(Part):
     def _widgets(self) -> dict[str, pn.viewable.Viewable]:
         of, narrow = self.param, {"width": 150}
         look = {"inline": True, "sizing_mode": "stretch_width", "stylesheets": [WRAPPED]}
-        self._own, self._others = (pn.widgets.CheckBoxGroup(name=name, **look) for name in ("Routes", "By other codes"))
+        self._own, self._others = (
+            pn.widgets.CheckBoxGroup(label=name, **look) for name in ("Routes", "By other codes")
+        )
         for group in (self._own, self._others):
             group.param.watch(self._choose, "value")
         select = pn.widgets.Select.from_param
         slider = pn.widgets.DiscreteSlider
         return {
-            "mode": select(of.mode, name="What", options={words: name for name, words in MODES.items()}, width=210),
-            "problem": select(of.problem, name="Problem", width=170),
+            "mode": select(of.mode, label="What", options={words: name for name, words in MODES.items()}, width=210),
+            "problem": select(of.problem, label="Problem", width=170),
             "options": pn.widgets.TextInput.from_param(
-                of.options, name="Further options of the problem", placeholder="n=16,stop=penalty", width=260
+                of.options, label="Further options of the problem", placeholder="n=16,stop=penalty", width=260
             ),
             "routes": self._own,
             "others": pn.Card(
@@ -162,16 +165,16 @@ class Laboratory(Part):
                 sizing_mode="stretch_width",
                 hide_header=False,
             ),
-            "judged": select(of.judged, name="Route", options=[self.judged], **narrow),
-            "stop": select(of.stop, name="Stop beyond the tip", **narrow),
-            "step": slider.from_param(of.step, name="Step h of differences", options=[*STEPS], width=200),
+            "judged": select(of.judged, label="Route", options=[self.judged], **narrow),
+            "tip_stop": select(of.tip_stop, label="Stop beyond the tip", **narrow),
+            "step": slider.from_param(of.step, label="Step h of differences", options=[*STEPS], width=200),
             "iterations": slider.from_param(
-                of.iterations, name="Unrolled iterations", options=[*ITERATIONS], width=200
+                of.iterations, label="Unrolled iterations", options=[*ITERATIONS], width=200
             ),
-            "inner": select(of.inner, name="Iteration on the tape", **narrow),
-            "fault": select(of.fault, name="Fault of faulty-adjoint", **narrow),
-            "rtol": select(of.rtol, name="Forward solve to rtol", **narrow),
-            "linear_solver": select(of.linear_solver, name="Linear solver", **narrow),
+            "inner": select(of.inner, label="Iteration on the tape", **narrow),
+            "fault": select(of.fault, label="Fault of faulty-adjoint", **narrow),
+            "rtol": select(of.rtol, label="Forward solve to rtol", **narrow),
+            "linear_solver": select(of.linear_solver, label="Linear solver", options=SOLVERS, width=180),
         }
 
     def _fit(self, *_: Any) -> None:
@@ -205,6 +208,9 @@ class Laboratory(Part):
     def begin(self) -> None:
         self._fresh, self._drawn = True, self.mode
         self._running.begin(self.expected)
+
+    def leave(self) -> None:
+        self._running.leave(*self._panels.values())
 
     def queue(self, before: int) -> None:
         super().queue(before)

@@ -24,13 +24,15 @@ MODES = {"invert": "estimate the parameters", "identify": "what the data determi
 PROBLEMS = ("bar", "plate", "rod", "coupon", "block", "heat", "vibrating-bar")  # that take data from files
 OPTIMIZERS = ("lbfgs", "gauss-newton", "levenberg-marquardt", "trust")
 ESTIMATES = "estimates.csv"  # what the command writes
+DROP = """.filepond--panel-root { background: var(--wash); border: 1px dashed var(--edge) }
+.filepond--drop-label { color: var(--ink) } .filepond--credits { display: none }"""
 EXAMPLE, READINGS = "bar_readings.csv", "node,displacement\n1,0.0908\n2,0.1796\n3,0.3256\n4,0.4408\n5,0.5457\n"
 
 
 class OwnData(Part):
     """State: what is asked, the problem and its options, the file by its name, its noise, units and columns."""
 
-    slug, title = "own-data", "Own data"
+    slug, title = "own-data", "Your own data"
     lead = "Drop a CSV file of displacements: what do they say of the moduli, and how well?"
 
     mode = param.Selector(default="invert", objects=[*MODES])
@@ -84,11 +86,11 @@ class OwnData(Part):
             width=200,
         )  # fmt: skip
         self._dropped = pn.widgets.FileDropper(
-            multiple=False, max_file_size=f"{upload.MOST // 2**20}MB", name="CSV file", sizing_mode="stretch_width",
-            max_width=460,
+            multiple=False, max_file_size=f"{upload.MOST // 2**20}MB", label="CSV file", sizing_mode="stretch_width",
+            max_width=460, stylesheets=[DROP],
         )  # fmt: skip
         self._dropped.param.watch(self._keep, "value")
-        self._optimizer = pn.widgets.Select.from_param(self.param.optimizer, name="Optimizer", width=150)
+        self._optimizer = pn.widgets.Select.from_param(self.param.optimizer, label="Optimizer", width=150)
         self.param.watch(self._fit, ["mode", "problem", "data"])
         self._fit()
         return pn.Column(
@@ -100,12 +102,12 @@ class OwnData(Part):
         of = self.param
         select, field = pn.widgets.Select.from_param, pn.widgets.TextInput.from_param
         return [
-            select(of.mode, name="What", options={words: name for name, words in MODES.items()}, width=210),
-            select(of.problem, name="Problem", width=150),
-            field(of.noise, name="Noise, standard deviation", placeholder="1e-3 or 0.4um", width=180),
-            field(of.units, name="Units, where not in the header", placeholder="mm, or x=mm,ux=um", width=200),
-            field(of.columns, name="Columns, where not by header", placeholder="x=NAME,ux=NAME", width=200),
-            field(of.options, name="Further options of the problem", placeholder="n=8,length=250mm", width=260),
+            select(of.mode, label="What", options={words: name for name, words in MODES.items()}, width=210),
+            select(of.problem, label="Problem", width=150),
+            field(of.noise, label="Noise, standard deviation", placeholder="1e-3 or 0.4um", width=180),
+            field(of.units, label="Units, where not in the header", placeholder="mm, or x=mm,ux=um", width=200),
+            field(of.columns, label="Columns, where not by header", placeholder="x=NAME,ux=NAME", width=200),
+            field(of.options, label="Further options of the problem", placeholder="n=8,length=250mm", width=260),
         ]
 
     def _fit(self, *_: Any) -> None:
@@ -117,15 +119,16 @@ class OwnData(Part):
 
     def _keep(self, event: Any) -> None:
         """A file was dropped, or taken away."""
+        if not event.new:
+            self.data = ""
         for name, content in event.new.items():
             try:
                 kept = upload.keep(self.place.folder, name, content)
             except InputError as error:
                 self.say(str(error))
             else:
-                if kept == self.data:
-                    self._changed()  # another file of that name
                 self.data = kept
+                self.start()
 
     def _estimates(self) -> Path:
         return self.place.folder / ESTIMATES
@@ -136,6 +139,9 @@ class OwnData(Part):
         self._fresh, self._drawn = True, self.mode
         self._take_along.disabled = True
         self._running.begin()
+
+    def leave(self) -> None:
+        self._running.leave(*self._panels.values())
 
     def queue(self, before: int) -> None:
         super().queue(before)

@@ -37,7 +37,7 @@ class Bill:
         self._counts = ColumnDataSource(self._counted([]))
         hover = [("route", "@route"), ("parameter", "@name"), ("dJ/dp", "@g{0.000000e}"), ("reference", "@exact{0.000000e}")]
         self._g = plot(
-            "parameter", "dJ/dp", title="dJ/dp by component; bars: the reference", hover=hover,
+            "parameter", "dJ/dp", title="dJ/dp; bars: the reference", hover=hover,
             x_range=Range1d(0.4, 1.6), y_range=Range1d(-1, 1),
         )  # fmt: skip
         self._g.vbar("x", 0.85, "g", source=self._reference, color=INK, fill_alpha=0.25, line_color=INK)

@@ -29,7 +29,7 @@ class Inversion:
         self._residuals = ColumnDataSource(residuals([]))
         self._of_p = plot(
             "parameter", "estimate, its own unit", height=300, x_range=Range1d(0.4, 8.6), y_range=Range1d(-1, 1),
-            title="Estimates with standard deviations; squares: the start; hatched: blind",
+            title="Estimates; squares: start; hatched: blind",
             hover=[("", "@name"), ("estimate", "@estimate"), ("+/-", "@sd"), ("start", "@start")],
         )  # fmt: skip
         self._of_p.vbar(
@@ -43,7 +43,7 @@ class Inversion:
         self._of_p.scatter("x", "estimate", source=self._estimates, color=colour("adjoint"), size=6)
         self._of_r = plot(
             "datum", "(S u - d) / noise", height=240, x_range=Range1d(0.4, 8.6), y_range=Range1d(-3, 3),
-            title="Residuals; band: two standard deviations of the noise",
+            title="Residuals; band: 2 sd of the noise",
             hover=[("", "@name"), ("measured", "@measured"), ("residual", "@residual")],
         )  # fmt: skip
         self._band = BoxAnnotation(bottom=-NOISE, top=NOISE, fill_color=INK, fill_alpha=0.12, line_color=None)
@@ -100,10 +100,12 @@ def said(steps: Sequence[dict[str, Any]], fits: Sequence[dict[str, Any]]) -> str
         kind = "good" if fit["verdict"] == "explained" else "bad"
         noise = "" if fit["noise"] is None else f", noise {number(fit['noise'], 2)} ({html.escape(fit['noise_source'])})"
         chi2 = "" if fit["chi2"] is None else f", chi<sup>2</sup> per datum {number(fit['chi2'], 3)}"
+        mark = f'<span aria-hidden="true">{"✓" if kind == "good" else "✗"}</span>'
+        word = f'<span class="verdict {kind}">{html.escape(fit["verdict"])}</span>'
+        rms = number(fit["rms"], 2)
         lines.append(
-            f'<p id="fit"><span aria-hidden="true">{"✓" if kind == "good" else "✗"}</span> the data are <span class='
-            f'"verdict {kind}">{html.escape(fit["verdict"])}</span>: {fit["data"]} data, rms of residuals '
-            f"{number(fit['rms'], 2)}{noise}{chi2}</p>"
+            f'<p id="fit">{mark} {"the data are " if kind == "good" else ""}{word}: {fit["data"]} data, rms of residuals '
+            f"{rms}{noise}{chi2}</p>"
         )
     return f'<div class="judged" role="status">{"".join(lines)}</div>'
 

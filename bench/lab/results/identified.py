@@ -32,7 +32,7 @@ class Identified:
         self._spectrum.add_layout(self._noise)
         self._of_p = plot(
             "parameter", "null share", height=240, x_range=Range1d(0.4, 8.6), y_range=Range1d(-0.05, 1.05),
-            title="What the data leave open; circle seen, triangle weak, cross blind",
+            title="Null share; triangle: weak, cross: blind",
             hover=[("", "@name"), ("null share", "@share"), ("", "@kind")],
         )  # fmt: skip
         self._of_p.segment("x", 0, "x", "share", source=self._shares, color=INK)

@@ -13,6 +13,7 @@ from gradient_routes.bench.lab.drawing import INK, colour, marker, plot, span, s
 from gradient_routes.bench.lab.numbers import number, table
 from gradient_routes.bench.studies.kink.figures import said
 
+NEAR = 1.6  # an event is shown from s / NEAR to s NEAR
 REACH = 0.12  # of the tangents beside the event, relative to s
 
 
@@ -30,7 +31,7 @@ class Kink:
         self._slopes = ColumnDataSource(slopes([]))
         hover = [("s", "@s{0.0000}"), ("active set", "@set")]
         self._of_J = plot(
-            "s, factor on all moduli", "J", title="J(s); short lines: the slopes beside the event", x_axis_type="log",
+            "s, factor on all moduli", "J", title="J(s); short lines: slopes at the event", x_axis_type="log",
             hover=[*hover, ("J", "@J{0.000000e}")], x_range=self._x, y_range=Range1d(0, 1),
         )  # fmt: skip
         self._of_J.multi_line("xs", "ys", source=self._J, color=INK, line_width=2)
@@ -74,9 +75,10 @@ class Kink:
         for rule in self._event:
             rule.visible, rule.location = s is not None, s or 1.0
         self._tangents.data = tangents(event)
-        span(self._x, self._values.data["s"], log=True, margin=0.02)
-        span(self._of_J.y_range, self._values.data["J"])
-        span(self._of_slope.y_range, found["slope"])
+        near = (0.0, float("inf")) if s is None else (s / NEAR, s * NEAR)
+        span(self._x, [v["s"] for v in visits] if s is None else near, log=True, margin=0.02)
+        span(self._of_J.y_range, [v["objective"] for v in visits if near[0] <= v["s"] <= near[1]])
+        span(self._of_slope.y_range, [y for x, y in zip(found["s"], found["slope"], strict=True) if near[0] <= x <= near[1]])
 
 
 def slopes(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:

@@ -30,7 +30,7 @@ class Unrolling:
         self._x = Range1d(0.8, 16)
         self._errors = plot(
             "k, iterations on the tape", "error, relative",
-            title="Circles: error of dJ/dp; broken: of J; rule: of implicit-ad", hover=hover,
+            title="dJ/dp; broken: J; rule: implicit-ad", hover=hover,
             x_axis_type="log", y_axis_type="log", x_range=self._x, y_range=Range1d(NOTHING, 1),
         )  # fmt: skip
         self._tape = plot(

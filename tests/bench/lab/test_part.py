@@ -54,7 +54,7 @@ class Pools:
     def __init__(self) -> None:
         self.asked: list[str] = []
 
-    async def messages(self, job: Command) -> AsyncGenerator[Any]:
+    async def messages(self, job: Command, told: Any) -> AsyncGenerator[Any]:
         self.asked.append(shlex.join(job.arguments))
         yield Row({"problem": job.arguments[2]})
         await asyncio.sleep(0.01)
