@@ -173,7 +173,9 @@ class Pool:
             except Exception as failure:  # a job that cannot be sent, a process that cannot be made
                 tell(Ended(Status.FAILED, one_line(failure)))
 
-        def free(_: asyncio.Future[None]) -> None:
+        def free(listening: asyncio.Future[None]) -> None:
+            if listening.cancelled():  # the pool was closed before
+                heard.put_nowait(Ended(Status.INTERRUPTED, "closed", killed=True))
             self._free.append(worker)
             self._turns.release()
 

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import AsyncGenerator, Coroutine, Iterator
 from contextlib import aclosing
+from functools import partial
 from typing import Any, cast
 
 import psutil
@@ -17,7 +18,7 @@ import pytest
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.channel import Call, Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
-from gradient_routes.bench.lab.pool import Lane, Pool
+from gradient_routes.bench.lab.pool import Begun, Lane, Pool
 
 LONG = 600.0  # [s] longer than any test
 PID, SLEEP, NOTHING = Call(os.getpid), Call(time.sleep, (LONG,)), Call(int)
@@ -39,7 +40,10 @@ def one(loop: asyncio.AbstractEventLoop) -> Iterator[Pool]:
 
 
 async def messages(pool: Pool, job: Job) -> list[Message]:
-    return [message async for message in pool.messages(job)]
+    """All but the first, which says that the job begins."""
+    begun, *others = [message async for message in pool.messages(job)]
+    assert begun == Begun()
+    return others
 
 
 async def end(pool: Pool, job: Job) -> Ended:
@@ -55,22 +59,25 @@ def test_a_process_stays_for_the_next_job(one: Pool, loop: asyncio.AbstractEvent
 
 def test_jobs_are_done_in_the_order_in_which_they_came(one: Pool, loop: asyncio.AbstractEventLoop) -> None:
     done: list[int] = []
+    before: dict[int, int] = {}
 
     async def job(k: int) -> None:
-        await messages(one, NOTHING)
+        async for _ in one.messages(NOTHING, partial(before.__setitem__, k)):
+            pass
         done.append(k)
 
-    async def many() -> int:
+    async def many() -> dict[int, int]:
         tasks = [asyncio.create_task(job(k)) for k in range(6)]
         await asyncio.sleep(0)
-        waiting = one.waiting
+        first = dict(before)
         tasks[3].cancel()  # while it waits
         await asyncio.gather(*tasks, return_exceptions=True)
-        return waiting
+        return first
 
-    assert loop.run_until_complete(many()) == 5
+    first = loop.run_until_complete(many())
+    assert [first[k] - first[1] for k in range(1, 6)] == [0, 1, 2, 3, 4]
     assert done == [0, 1, 2, 4, 5]
-    assert one.waiting == 0
+    assert {before[k] for k in done[1:]} == {1}, "each was next in the end"
 
 
 @pytest.mark.parametrize(
@@ -110,8 +117,8 @@ def test_messages_that_are_not_asked_for_any_more_end_the_job(one: Pool, loop: a
     async def some() -> Ended:
         async with aclosing(cast(AsyncGenerator[Message], one.messages(Call(os.getpid)))) as told:
             async for message in told:
-                assert isinstance(message, Returned)
-                break
+                if isinstance(message, Returned):
+                    break
         return await end(one, PID)
 
     assert loop.run_until_complete(some()) == Ended(Status.OK)
