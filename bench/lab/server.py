@@ -17,6 +17,7 @@ from typing import cast
 
 import panel as pn
 from bokeh.server.server import Server
+from panel.reactive import Syncable
 from tornado.ioloop import IOLoop
 from tornado.web import HTTPError, RequestHandler
 
@@ -28,6 +29,7 @@ from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
 
 LOOPBACK = "127.0.0.1"
 REFUSALS = ("tornado.access", "bokeh.server.views.ws")  # they are told to who asked
+SOON = 10  # [ms] for which Panel waits for further moves of a slider, 50 else; a part skips those that it is late for
 UPLOAD = 20 * 2**20  # [byte] of one message of a page, files included
 IDLE = 60_000  # [ms] after which the session of a page that was closed ends
 
@@ -80,6 +82,7 @@ class Laboratory:
             )
             for pool in self.pools:
                 closing.callback(pool.close)
+            Syncable._debounce = SOON
             server = self._server()
             closing.callback(server.stop)
             loop = IOLoop.current()

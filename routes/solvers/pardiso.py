@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import weakref
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -144,6 +145,7 @@ class Pardiso:
             return PardisoFactorization(A, who, SYMMETRIC, idle)
 
 
+@cache
 def installed() -> bool:
     return importlib.util.find_spec("pymklpardiso") is not None
 
