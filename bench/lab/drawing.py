@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from bokeh.models import HoverTool, Legend, Range1d, SaveTool
+from bokeh.models import HoverTool, Legend, Range1d, SaveTool, Title
 from bokeh.plotting import figure
 
 from gradient_routes.bench.cases.selector import bare
@@ -42,7 +42,7 @@ def plot(
     hover   pairs of a label and what is shown, as Bokeh writes it
     """
     drawn = figure(
-        title=title or None,
+        title=Title(text=title, text_font_size="12px") if title else None,
         x_axis_label=x,
         y_axis_label=y,
         height=height,

@@ -16,7 +16,7 @@ class Running:
 
     def __init__(self, part: Part) -> None:
         self._part = part
-        self.run = pn.widgets.Button(label="Run", button_type="primary", width=90, on_click=lambda _: part.start())
+        self.run = pn.widgets.Button(label="Run", color="primary", width=90, on_click=lambda _: part.start())
         self.stop = pn.widgets.Button(label="Stop", width=90, disabled=True, on_click=lambda _: part.stop())
         self.progress = pn.pane.HTML("", width=330)
         self._of, self._come = 0, 0

@@ -65,9 +65,12 @@ class Kink:
         self.table.object = listed(self.rows)
         at = {row["s"]: row for row in self.rows if row["kind"] in ("point", "side") and row["objective"] is not None}
         visits = [at[s] for s in sorted(at)]
-        branches = [[v for v in visits if v["active_set"] == name] for name in dict.fromkeys(v["active_set"] for v in visits)]
-        self._J.data = {"xs": [[v["s"] for v in b] for b in branches], "ys": [[v["objective"] for v in b] for b in branches]}
-        self._values.data = {name: [v[key] for v in visits] for name, key in zip(self._values.data, ("s", "objective", "active_set"), strict=True)}
+        sets = dict.fromkeys(v["active_set"] for v in visits)
+        branches = [[v for v in visits if v["active_set"] == name] for name in sets]
+        xs, ys = ([[v[key] for v in branch] for branch in branches] for key in ("s", "objective"))
+        self._J.data = {"xs": xs, "ys": ys}
+        columns = zip(self._values.data, ("s", "objective", "active_set"), strict=True)
+        self._values.data = {name: [v[key] for v in visits] for name, key in columns}
         found = slopes(self.rows)
         self._slopes.data, self._lines.data = found, joined(found)
         event = next((row for row in self.rows if row["kind"] == "event"), None)
@@ -78,7 +81,8 @@ class Kink:
         near = (0.0, float("inf")) if s is None else (s / NEAR, s * NEAR)
         span(self._x, [v["s"] for v in visits] if s is None else near, log=True, margin=0.02)
         span(self._of_J.y_range, [v["objective"] for v in visits if near[0] <= v["s"] <= near[1]])
-        span(self._of_slope.y_range, [y for x, y in zip(found["s"], found["slope"], strict=True) if near[0] <= x <= near[1]])
+        seen = [y for x, y in zip(found["s"], found["slope"], strict=True) if near[0] <= x <= near[1]]
+        span(self._of_slope.y_range, seen)
 
 
 def slopes(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:

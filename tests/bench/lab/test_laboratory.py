@@ -96,6 +96,18 @@ def test_what_is_no_choice_leaves_the_state_as_it_is(state: dict[str, str]) -> N
     assert next(iter(state)) in str(part.status.object)
 
 
+def test_controls_are_those_that_matter() -> None:
+    part = of(mode="vcurve", judged="faulty-adjoint")
+    part.content()
+    assert {name for name, control in part._controls.items() if control.visible} == {
+        "mode", "problem", "options", "judged", "fault", "rtol", "linear_solver"
+    }  # fmt: skip
+    part.judged = "fd-central"
+    assert part._controls["step"].visible
+    assert not part._controls["fault"].visible
+    assert "press Run" in str(part.status.object)
+
+
 def test_routes_that_apply_are_offered() -> None:
     own, others = chosen.applying("bar")
     assert {"fd-central", "complex-step", "adjoint", "implicit-ad", "faulty-adjoint"} <= {*own}

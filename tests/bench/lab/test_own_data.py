@@ -153,3 +153,11 @@ def test_a_bad_file_is_one_line(page: Page, laboratory: str) -> None:
     drop(page, "big.csv", bytes(6 * 2**20))
     expect(page.get_by_role("alert")).to_contain_text("Maximum file size is 5 MB")
     assert "big.csv" not in page.locator("code").last.inner_text()
+
+
+def test_a_file_for_a_larger_problem_is_run_when_it_is_dropped(page: Page, laboratory: str) -> None:
+    rod = "n=4,length=300mm,diameter=10mm,conductivity=50,base=100degC,ambient=20degC"
+    page.goto(f"{laboratory}/own-data?problem=rod&noise=0.1K&options={rod}")
+    drop(page, "rod.csv", b"x [mm];T [degC]\n50;80\n150;60\n250;50\n")
+    expect(page.locator("#ended")).to_be_visible()
+    expect(page.get_by_role("button", name="Run")).to_be_visible()
