@@ -165,15 +165,15 @@ class Part(param.Parameterized):
 
     def _show(self) -> None:
         """The command and the URL of the state."""
+        link = f'<button type="button" class="copy" data-link="{html.escape(self.url())}">copy link</button>'
         try:
-            text = f"routes {shlex.join(self.command())}"
-        except InputError as error:
-            text = str(error)
-        self.shown.object = (
-            f'<div class="command"><code tabindex="0">{html.escape(text)}</code>'
-            f'<button type="button" class="copy" data-copy="{html.escape(text)}">copy command</button>'
-            f'<button type="button" class="copy" data-link="{html.escape(self.url())}">copy link</button></div>'
-        )
+            text = html.escape(f"routes {shlex.join(self.command())}")
+        except InputError:  # why not is said by who is to run it
+            shown = f"<code></code>{link}"
+        else:
+            copy = f'<button type="button" class="copy" data-copy="{text}">copy command</button>'
+            shown = f'<code tabindex="0">{text}</code>{copy}{link}'
+        self.shown.object = f'<div class="command">{shown}</div>'
         if pn.state.location is not None and self._document is not None:
             pn.state.location.search = f"?{self.query()}".rstrip("?")
 

@@ -48,7 +48,7 @@ LINES = {
 class Derivation(Part):
     """State: log2 of the moduli over that of the start, and the nodes with a sensor."""
 
-    slug, title = "derivation", "The discrete adjoint, step by step"
+    slug, title = "derivation", "The discrete adjoint"
     lead = "Change a modulus or a sensor: every number beside every line follows."
 
     octaves = param.List([0.0] * N, item_type=float, bounds=(N, N), doc="log2 of E_e / E of the start")

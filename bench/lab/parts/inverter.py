@@ -35,7 +35,7 @@ SPREAD = """<h2>The same with {draws} draws of the noise</h2><p>Whiskers above: 
 class Inverter(Part):
     """State: the problem, its data and their noise, the optimizer and its iterations; draws of the noise, 0 for one."""
 
-    slug, title = "inverter", "Moduli of a bar, from displacements"
+    slug, title = "inverter", "Adjoint bar inverter"
     lead = "Switch sensors, add noise, weigh Phi, step: what a gradient finds, what it costs, and what it cannot see."
 
     sensors = param.List([1, 3, 5], item_type=int, bounds=(0, N), doc="nodes")

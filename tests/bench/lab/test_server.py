@@ -95,7 +95,7 @@ def test_no_files_and_no_modules_are_served(laboratory: str, path: str) -> None:
 def test_a_page_is_read_before_scripts_are_loaded(laboratory: str) -> None:
     status, text = asked(laboratory, "/derivation")
     assert status == 200
-    assert "<h1>The discrete adjoint, step by step</h1>" in text
+    assert "<h1>The discrete adjoint</h1>" in text
     assert text.count("<script defer src=") == text.count(" src=") == 4
 
 
