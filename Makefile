@@ -104,6 +104,7 @@ benchmark: $(READY) ## the default matrix into results/, with resume, then scali
 	$(BIN)/python -m benchmarks.error_bars
 	$(BIN)/python -m benchmarks.adapter_overhead
 	$(BIN)/python -m benchmarks.march
+	$(BIN)/python -m benchmarks.laboratory
 
 adapters: $(READY) ## environments of Taichi, Warp, torch-fem and C, with which the tests run their adapters (2.5 GB)
 	$(BIN)/routes environments create --missing taichi warp torch-fem executable
