@@ -20,6 +20,8 @@ from gradient_routes.bench.lab.pool import Pool
 from gradient_routes.bench.lab.shell import Command, Exited, Row, Said
 from gradient_routes.problems.errors import InputError
 
+from .aside import aside
+
 
 class Tried(Part):
     """One parameter of each kind."""
@@ -79,7 +81,7 @@ def settled(part: Tried, *states: dict[str, Any]) -> None:
         while part.running:
             await asyncio.sleep(0.01)
 
-    asyncio.run(move())
+    aside(move())
 
 
 def test_a_url_holds_the_state() -> None:
@@ -130,5 +132,5 @@ def test_what_runs_can_be_stopped() -> None:
         while part.running:
             await asyncio.sleep(0.01)
 
-    asyncio.run(move())
+    aside(move())
     assert "stopped" in part.said

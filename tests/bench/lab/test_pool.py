@@ -20,19 +20,21 @@ from gradient_routes.bench.execution.isolation.channel import Call, Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
 from gradient_routes.bench.lab.pool import Begun, Lane, Pool
 
+from .aside import Loop, aside
+
 LONG = 600.0  # [s] longer than any test
 PID, SLEEP, NOTHING = Call(os.getpid), Call(time.sleep, (LONG,)), Call(int)
 
 
 @pytest.fixture(scope="module")
-def loop() -> Iterator[asyncio.AbstractEventLoop]:
-    made = asyncio.new_event_loop()
+def loop() -> Iterator[Loop]:
+    made = Loop()
     yield made
     made.close()
 
 
 @pytest.fixture(scope="module")
-def one(loop: asyncio.AbstractEventLoop) -> Iterator[Pool]:
+def one(loop: Loop) -> Iterator[Pool]:
     """With one process."""
     pool = Pool(Lane(workers=1, timeout=LONG, first=NOTHING))
     yield pool
@@ -50,14 +52,14 @@ async def end(pool: Pool, job: Job) -> Ended:
     return cast(Ended, (await messages(pool, job))[-1])
 
 
-def test_a_process_stays_for_the_next_job(one: Pool, loop: asyncio.AbstractEventLoop) -> None:
+def test_a_process_stays_for_the_next_job(one: Pool, loop: Loop) -> None:
     first, second = (loop.run_until_complete(messages(one, PID)) for _ in range(2))
     assert first == second
     assert first[0].value != os.getpid()
     assert first[1] == Ended(Status.OK)
 
 
-def test_jobs_are_done_in_the_order_in_which_they_came(one: Pool, loop: asyncio.AbstractEventLoop) -> None:
+def test_jobs_are_done_in_the_order_in_which_they_came(one: Pool, loop: Loop) -> None:
     done: list[int] = []
     before: dict[int, int] = {}
 
@@ -90,16 +92,14 @@ def test_jobs_are_done_in_the_order_in_which_they_came(one: Pool, loop: asyncio.
         (Call(lambda: None), Status.FAILED, "lambda"),  # it cannot be sent
     ],
 )
-def test_a_job_that_fails_ends_alone(
-    one: Pool, loop: asyncio.AbstractEventLoop, job: Job, status: Status, says: str
-) -> None:
+def test_a_job_that_fails_ends_alone(one: Pool, loop: Loop, job: Job, status: Status, says: str) -> None:
     ended = loop.run_until_complete(end(one, job))
     assert (ended.status, says in ended.reason) == (status, True), ended.reason
     assert "\n" not in ended.reason
     assert loop.run_until_complete(end(one, PID)) == Ended(Status.OK)
 
 
-def test_a_job_that_nobody_waits_for_is_ended(one: Pool, loop: asyncio.AbstractEventLoop) -> None:
+def test_a_job_that_nobody_waits_for_is_ended(one: Pool, loop: Loop) -> None:
     async def left(ticks: int) -> Ended:
         task = asyncio.create_task(end(one, SLEEP))
         for _ in range(ticks):
@@ -113,7 +113,7 @@ def test_a_job_that_nobody_waits_for_is_ended(one: Pool, loop: asyncio.AbstractE
         assert loop.run_until_complete(left(ticks)) == Ended(Status.OK)
 
 
-def test_messages_that_are_not_asked_for_any_more_end_the_job(one: Pool, loop: asyncio.AbstractEventLoop) -> None:
+def test_messages_that_are_not_asked_for_any_more_end_the_job(one: Pool, loop: Loop) -> None:
     async def some() -> Ended:
         async with aclosing(cast(AsyncGenerator[Message], one.messages(Call(os.getpid)))) as told:
             async for message in told:
@@ -127,7 +127,7 @@ def test_messages_that_are_not_asked_for_any_more_end_the_job(one: Pool, loop: a
 def run(test: Coroutine[Any, Any, Any]) -> Any:
     """And see that nothing is left."""
     threads, processes = threading.active_count(), {*psutil.Process().children(recursive=True)}
-    found = asyncio.run(test)
+    found = aside(test)
     assert not {*psutil.Process().children(recursive=True)} - processes
     assert threading.active_count() == threads
     return found

@@ -8,13 +8,15 @@ from pathlib import Path
 from gradient_routes.bench.lab.pool import Lane, Pool
 from gradient_routes.bench.lab.shell import Command
 
+from .aside import aside
+
 
 def test_places_in_the_queue_move_up_when_somebody_leaves() -> None:
     told: dict[str, list[int]] = {"first": [], "second": []}
 
     async def wait() -> None:
         pool = Pool(Lane(workers=1, timeout=1.0))
-        await pool._idle.get()  # its only process works
+        await pool._turns.acquire()  # its only process works
         job = Command(("run",), Path("/"))
         asked = {name: pool.messages(job, heard.append) for name, heard in told.items()}
         waiting = {name: asyncio.ensure_future(anext(messages)) for name, messages in asked.items()}
@@ -27,4 +29,4 @@ def test_places_in_the_queue_move_up_when_somebody_leaves() -> None:
         waiting["second"].cancel()
         await asyncio.gather(*waiting.values(), return_exceptions=True)
 
-    asyncio.run(wait())
+    aside(wait())
