@@ -24,8 +24,9 @@ MODES = {"invert": "estimate the parameters", "identify": "what the data determi
 PROBLEMS = ("bar", "plate", "rod", "coupon", "block", "heat", "vibrating-bar")  # that take data from files
 OPTIMIZERS = ("lbfgs", "gauss-newton", "levenberg-marquardt", "trust")
 ESTIMATES = "estimates.csv"  # what the command writes
-DROP = """.filepond--panel-root { background: var(--wash) !important; border: 1px dashed var(--edge) }
-.filepond--drop-label { color: var(--ink) !important } .filepond--credits { display: none }"""
+DROP = """.filepond--root, .filepond--drop-label { background: transparent !important; color: var(--ink) !important }
+.filepond--root { border: 1px dashed var(--edge); border-radius: 5px } .filepond--panel-root { background: var(--wash) }
+.filepond--credits { display: none }"""
 EXAMPLE, READINGS = "bar_readings.csv", "node,displacement\n1,0.0908\n2,0.1796\n3,0.3256\n4,0.4408\n5,0.5457\n"
 
 
