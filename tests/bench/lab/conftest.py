@@ -42,7 +42,7 @@ def laboratory(kept: Path) -> Iterator[str]:
         served.wait()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # Playwright runs a loop, beside which tests of other modules could run none
 def browser() -> Iterator[Browser]:
     if CHROMIUM is None:
         pytest.skip("no Chromium here - apt-get install chromium")
