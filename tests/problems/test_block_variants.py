@@ -42,7 +42,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "layers": {"unknown": "layers", "layers": 2, "law": "linear"},
     "constants": {"unknown": "constants"},
     "twin traction": {"unknown": "traction", "data": "twin", "size": "2", "law": "linear"},
-    "tet10 shape": {"unknown": "shape", "element": "tet10", "ny": 1, "nz": 1, "surface": "right"},
+    "tet10 shape": {"unknown": "shape", "element": "tet10", "ny": 1, "nz": 1, "surface": "right", "law": "linear"},
     "load": {"unknown": "load", "law": "linear"},
     "yeoh": {"law": "yeoh"},
     "ogden": {"law": "ogden", "unknown": "constants"},
