@@ -33,6 +33,8 @@ if sys.dont_write_bytecode and "PYTEST_XDIST_WORKER" not in os.environ:
     for folder in ("gradient_routes", "bench", "routes", "problems"):
         compileall.compile_dir(ROOT / folder, quiet=2)
 
+os.environ.pop("COLUMNS", None)  # tables are as wide as in a pipe, not as the terminal of who runs the tests
+
 gc.set_threshold(50_000)  # what JAX traces lives on: looking through it at every 700 objects finds nothing
 collect = gc.collect
 
@@ -142,12 +144,6 @@ def somewhere(problem: Problem, seed: int = 0) -> Array:
 
 def relative_error(g: Array, reference: Array) -> float:
     return float(np.linalg.norm(g - reference) / np.linalg.norm(reference))
-
-
-@pytest.fixture(autouse=True)
-def piped_width(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables are as wide as in a pipe: test runners tell the width of their own terminal."""
-    monkeypatch.delenv("COLUMNS", raising=False)
 
 
 @pytest.fixture
