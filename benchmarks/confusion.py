@@ -40,8 +40,8 @@ PROBLEMS = (
     "bar[stop=penalty]",
     "bar[stop=multiplier]",
     "bar[stop=softplus,gap=1.0]",
-    "block[n=2]",
-    "block[nx=1,ny=1,nz=2,load=follower]",
+    "block[n=2,derivatives=hand]",
+    "block[nx=1,ny=1,nz=2,load=follower,derivatives=hand]",
     "advection",
     "advection[unknown=source,alpha=0.1]",
 )

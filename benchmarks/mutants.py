@@ -24,6 +24,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -118,13 +119,18 @@ def mutants(area: str, path: Path) -> Iterator[Mutant]:
     yield from walk(ast.parse(source), "")
 
 
+@cache
+def every(area: str) -> tuple[Mutant, ...]:
+    """All of the files of one area."""
+    files = [path for path in sorted((ROOT / area).rglob("*.py")) if path.name not in LEFT_OUT]
+    return tuple(m for path in files for m in mutants(area, path))
+
+
 def sample(seed: int = SEED) -> list[Mutant]:
     """The same number of every area, in the order of their ids."""
     chosen: list[Mutant] = []
     for area in AREAS:
-        files = [path for path in sorted((ROOT / area).rglob("*.py")) if path.name not in LEFT_OUT]
-        every = (m for path in files for m in mutants(area, path))
-        chosen += sorted(every, key=lambda m: hashlib.sha256(f"{seed} {m.id}".encode()).digest())[:EACH]
+        chosen += sorted(every(area), key=lambda m: hashlib.sha256(f"{seed} {m.id}".encode()).digest())[:EACH]
     return sorted(chosen, key=lambda m: m.id)
 
 

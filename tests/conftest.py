@@ -33,7 +33,22 @@ if sys.dont_write_bytecode and "PYTEST_XDIST_WORKER" not in os.environ:
     for folder in ("gradient_routes", "bench", "routes", "problems"):
         compileall.compile_dir(ROOT / folder, quiet=2)
 
+os.environ.pop("COLUMNS", None)  # tables are as wide as in a pipe, not as the terminal of who runs the tests
+
 gc.set_threshold(50_000)  # what JAX traces lives on: looking through it at every 700 objects finds nothing
+collect = gc.collect
+
+
+def collect_once(generation: int = 2) -> int:
+    """Measurements collect garbage first: in all that JAX compiled for earlier tests, time and again, a tenth of what
+    tests take. What is left over once is not looked through again.
+    """
+    found = collect(generation)
+    gc.freeze()
+    return found
+
+
+gc.collect = collect_once
 
 import numpy as np
 import pytest
@@ -129,19 +144,6 @@ def somewhere(problem: Problem, seed: int = 0) -> Array:
 
 def relative_error(g: Array, reference: Array) -> float:
     return float(np.linalg.norm(g - reference) / np.linalg.norm(reference))
-
-
-@pytest.fixture(autouse=True)
-def piped_width(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables are as wide as in a pipe: test runners tell the width of their own terminal."""
-    monkeypatch.delenv("COLUMNS", raising=False)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def few_objects_to_collect() -> None:
-    """Measurements collect garbage first: through all that JAX compiled for earlier tests that would take seconds."""
-    gc.collect()
-    gc.freeze()
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,7 @@ from commands import ROOT
 PACKAGE = ROOT / "gradient_routes"
 HEAVY = {"jax", "scipy", "pandas", "skfem", "meshio", "pyarrow", "vl_convert"}
 FLOORS = ("problems", "routes", "bench")
+STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)  # in no other node is anything imported
 # what routes may know of floor 1: the contract, no single problem
 MATRICES = {f"matrices.{kind}" for kind in ("tridiagonal", "sparse", "recurrence", "step_matrix", "global_step")}
 CONTRACT = {"problem", "transient", "rates", "errors", "text", "jax64", "programs"} | MATRICES
@@ -63,22 +64,24 @@ def modules(floor: str) -> dict[str, Path]:
     return found
 
 
-def imports(path: Path, module_level_only: bool = False) -> Iterator[str]:
+@cache
+def imports(path: Path, module_level_only: bool = False) -> tuple[str, ...]:
     """Dotted names a file imports, of `from a import b` both a and a.b; those under TYPE_CHECKING do not run and do
     not count.
     """
+    names: list[str] = []
     nodes: list[ast.AST] = [ast.parse(path.read_text())]
     while nodes:
         node = nodes.pop()
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            yield node.module or ""
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            names += [node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)]
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             nodes.extend(node.orelse)
         elif not (module_level_only and isinstance(node, ast.FunctionDef)):
-            nodes.extend(ast.iter_child_nodes(node))
+            nodes.extend(child for child in ast.iter_child_nodes(node) if isinstance(child, STATEMENTS))
+    return tuple(names)
 
 
 def floor_of(name: str) -> str | None:

@@ -19,7 +19,7 @@ class Front(Transient):
         label=["D", "r", "height"].__getitem__,
     )
 
-    def __init__(self, n: int = 30, steps: int = 20):
+    def __init__(self, *, n: int = 30, steps: int = 20):
         self.steps, self.n_state, self.h = steps, n * steps, 0.05
         x = (np.arange(n) + 0.5) / n
         self.bump = np.exp(-(((x - 0.3) / 0.1) ** 2))

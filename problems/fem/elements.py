@@ -47,9 +47,10 @@ def cofactors(J: Any, xp: Any) -> tuple[Any, Any]:
     if J.shape[-1] == 2:
         cof = xp.stack([J[..., 1, ::-1], J[..., 0, ::-1]], axis=-2) * np.array([[1.0, -1.0], [-1.0, 1.0]])
         return cof, (J[..., 0, :] * cof[..., 0, :]).sum(-1)
-    a, b, c = J[..., 0, :], J[..., 1, :], J[..., 2, :]
-    cof = xp.stack([xp.cross(b, c), xp.cross(c, a), xp.cross(a, b)], axis=-2)
-    return cof, (a * cof[..., 0, :]).sum(-1)
+    j, k = np.array([1, 2, 0]), np.array([2, 0, 1])  # the two that follow 0, 1, 2
+    rows_j, rows_k = j[:, None], k[:, None]
+    cof = J[..., rows_j, j] * J[..., rows_k, k] - J[..., rows_j, k] * J[..., rows_k, j]
+    return cof, (J[..., 0, :] * cof[..., 0, :]).sum(-1)
 
 
 @dataclass(frozen=True)

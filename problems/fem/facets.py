@@ -63,5 +63,12 @@ class Facets:
         return np.asarray(np.einsum("fqa,fai->fqi", self.N, self.geometry.X[self.nodes]).mean(axis=1))
 
     def areas(self, X: Any, xp: Any) -> Any:
-        """dA (n_f, n_q) [m^2] for nodes at X (n_nodes, d)."""
+        """dA (n_f, n_q) [m^2] for nodes at X (n_nodes, d); those of the mesh are computed once."""
+        return self._areas if X is self.geometry.X else self._areas_at(X, xp)
+
+    @cached_property
+    def _areas(self) -> Array:
+        return np.asarray(self._areas_at(self.geometry.X, np))
+
+    def _areas_at(self, X: Any, xp: Any) -> Any:
         return xp.sqrt((self.normals(X[self.nodes], xp) ** 2).sum(-1))

@@ -88,8 +88,9 @@ class SymmetricSparse:
     @property
     def norm(self) -> float:
         """|A|_inf."""
-        rows = abs(self.upper) @ np.ones(self.pattern.n) + abs(self.upper).T @ np.ones(self.pattern.n)
-        return float((rows - abs(self.diagonal)).max())
+        size, columns = np.abs(self.data), self.pattern.indices
+        rows = np.add.reduceat(size, self.pattern.indptr[:-1]) + np.bincount(columns, size, self.pattern.n)
+        return float((rows - np.abs(self.diagonal)).max())
 
     @property
     def nbytes(self) -> int:
@@ -153,7 +154,7 @@ class GeneralSparse:
     @property
     def norm(self) -> float:
         """|A|_inf."""
-        return float((abs(self.rows) @ np.ones(self.pattern.n)).max())
+        return float(np.add.reduceat(np.abs(self.data), self.pattern.indptr[:-1]).max())
 
     @property
     def nbytes(self) -> int:

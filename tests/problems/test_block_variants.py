@@ -42,8 +42,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "layers": {"unknown": "layers", "layers": 2, "law": "linear"},
     "constants": {"unknown": "constants"},
     "twin traction": {"unknown": "traction", "data": "twin", "size": "2", "law": "linear"},
-    "tet10 shape": {"unknown": "shape", "element": "tet10", "ny": 1, "nz": 1, "surface": "right"},
-    "load": {"unknown": "load"},
+    "tet10 shape": {"unknown": "shape", "element": "tet10", "ny": 1, "nz": 1, "surface": "right", "law": "linear"},
+    "load": {"unknown": "load", "law": "linear"},
     "yeoh": {"law": "yeoh"},
     "ogden": {"law": "ogden", "unknown": "constants"},
     "hand": {"derivatives": "hand", "parametrization": "raw"},
@@ -63,7 +63,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     },
 }
 LONG = ("yeoh", "ogden")  # compile longest: routes do not know the law, test_materials does
-UNROLLED = ("layers", "constants", "twin traction", "tet10 shape", "load")  # every unknown: third derivatives
+UNROLLED = ("layers", "constants", "twin traction", "follower shape", "load")  # every unknown: third derivatives
 TIGHT = Solver(rtol=1e-14)
 
 

@@ -91,8 +91,10 @@ def test_every_exact_route_gives_the_gradient(law: str, volume: str) -> None:
 @pytest.mark.parametrize("law", RUBBERS)
 def test_every_combination_of_curves_gives_its_constants_back(law: str, volume: str) -> None:
     engine = Engine("gauss-newton", Limits(100, 1e-15))
-    # the others take long; one curve tells the four constants of Ogden's law so badly that it takes hundreds of steps
-    every = EVERY if volume == "incompressible" or law == "neo-hookean" else EVERY[-1:]
+    # compressible rubber, which takes long, has all curves at once, and one alone; one curve tells the four constants
+    # of Ogden's law so badly that it takes hundreds of steps
+    some = [EVERY[0], EVERY[-1]] if law == "neo-hookean" else EVERY[-1:]
+    every = EVERY if volume == "incompressible" else some
     for mode in every:
         given = ",".join(f"{name}={value}" for name, value in options(mode, law, volume).items())
         (spec,) = problems([f"coupon[{given}]"])

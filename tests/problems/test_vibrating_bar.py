@@ -193,13 +193,16 @@ STOPPED: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("stop", STOPPED)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_gradients_hold_where_the_tip_meets_a_stop(scheme: str, stop: str) -> None:
-    """It closes and opens again within these steps; the second derivative of J jumps where a penalty does."""
+    """It closes and opens again within these steps; the second derivative of J jumps where a penalty does. Every scheme
+    and every stop once by unrolled AD, which is traced longest and sees a step as implicit AD does.
+    """
     bar = made(scheme=scheme, steps=16, gap=0.05, k_c=30.0, **STOPPED[stop])
     model, p = Model(bar, Solver(rtol=1e-14)), bar.parameters.start
     closed = model.solve(p).u.reshape(16, 2, 4)[:, 0, -1] > 0.05
     assert np.diff(closed.astype(int)).min() < 0 < closed.sum()
     exact = complex_step.prepare(model, p)(p).gradient
-    for route in (tangent, adjoint, implicit_ad, unrolled_ad):
+    unrolled = [unrolled_ad] if [*SCHEMES].index(scheme) == [*STOPPED].index(stop) else []
+    for route in (tangent, adjoint, implicit_ad, *unrolled):
         assert relative_error(route.prepare(model, p)(p).gradient, exact) < 1e-12, route.name
 
 

@@ -69,6 +69,20 @@ def test_general_matrices_are_assembled_and_multiply(dtype: type) -> None:
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
+def test_the_upper_triangle_stands_for_a_symmetric_matrix(dtype: type) -> None:
+    A_e = entries(dtype) + entries(dtype).transpose(0, 2, 1)
+    rows, columns = np.triu_indices(M)
+    A, D, v = (
+        SymmetricPattern.of_elements(UNKNOWNS, N).assemble(A_e[:, rows, columns]),
+        dense(A_e),
+        RNG.standard_normal(N),
+    )
+    np.testing.assert_allclose(A.full().toarray(), D, rtol=1e-14)
+    np.testing.assert_allclose(A @ v, D @ v, rtol=1e-13, atol=1e-13)
+    assert A.norm == pytest.approx(np.abs(D).sum(axis=1).max(), rel=1e-14)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
 def test_blocks_stand_on_the_diagonal(dtype: type) -> None:
     blocks = tuple(PATTERN.assemble(entries(dtype, seed)) for seed in (1, 2))
     A, v = BlockDiagonal(blocks), RNG.standard_normal(2 * N)

@@ -175,7 +175,9 @@ def test_refined_solves_meet_their_tolerance_and_do_little_more() -> None:
     assert products < 187
 
 
-@pytest.mark.parametrize("problem", ["bar", "block[n=2]", "block[nx=1,ny=1,nz=2,load=follower,cases=2,law=linear]"])
+@pytest.mark.parametrize(
+    "problem", ["bar", "block[n=2,derivatives=hand]", "block[nx=1,ny=1,nz=2,load=follower,cases=2,derivatives=hand]"]
+)
 def test_bills_are_as_declared(cli, problem: str) -> None:
     ways = ["all"] if "follower" not in problem else ["adjoint", "tangent", "complex-step"]
     named = [word for way in ways for word in ("--route", way)]

@@ -34,7 +34,7 @@ ACCURACY = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "unrolled-ad": 1e-9}
 
 
 ITERATIONS = ("cg", "richardson", "jacobi")  # of unrolled AD, which compile anew for every k
-SIZES = ("bar", "bar[n=1]", "bar[n=2]")
+SIZES = ("bar", "bar[n=1]")
 
 
 def pairs(routes: tuple[Route, ...] = ROUTES, iterated: tuple[str, ...] = SIZES) -> Iterator[tuple[str, Route, dict]]:
@@ -130,7 +130,8 @@ def test_counted_work_is_the_declared_work(name: str, route: Route, options: dic
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 33, 200])
 @pytest.mark.parametrize("route", ROUTES, ids=ids)
 def test_declared_work_holds_for_every_size(route: Route, n: int) -> None:
-    for options in OPTIONS.get(route.name, [{}])[: 1 if route is unrolled_ad and n > 5 else None]:
+    every = OPTIONS.get(route.name, [{}])
+    for options in [every[n % len(every)]] if route is unrolled_ad and n != 3 else every:  # compile anew for every n
         _, counted, declared = differentiate(route, Bar(n=n), np.zeros(n), Solver(), **options)
         assert counted == declared
 

@@ -23,7 +23,7 @@ INNER = tuple(KEPT)
 OPEN = unrolled_ad.defaults
 
 
-@pytest.mark.parametrize("k", [1, 3, 6])
+@pytest.mark.parametrize("k", [3, 6])
 @pytest.mark.parametrize("inner", INNER)
 def test_it_is_the_gradient_of_the_kth_iterate(inner: str, k: int) -> None:
     """Equal to central differences of the k-step objective, and not the gradient of the solution."""
@@ -66,7 +66,7 @@ def test_the_iterate_is_the_textbook_one(inner: str) -> None:
     np.testing.assert_allclose(iteration(inner, bar.traced()).iterate((np.zeros(5), p), 3), u, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("beyond", [1, 2, 10, 200])
+@pytest.mark.parametrize("beyond", [1, 200])
 @pytest.mark.parametrize("start", ["start", "somewhere"])
 def test_conjugate_gradients_stand_still_after_convergence(start: str, beyond: int) -> None:
     bar = Bar(n=8)
@@ -108,8 +108,9 @@ def after_30_iterations(inner: str, checkpoint: int | None) -> tuple[Array, int]
     return g, model.tally.work.matvecs
 
 
-@pytest.mark.parametrize("checkpoint", [1, 4, 7, 30])
-@pytest.mark.parametrize("inner", INNER)
+@pytest.mark.parametrize(
+    ("inner", "checkpoint"), [("cg", 1), ("cg", 4), ("cg", 7), ("cg", 30), ("richardson", 4), ("jacobi", 7)]
+)
 def test_checkpoints_change_the_bill_and_not_the_gradient(inner: str, checkpoint: int) -> None:
     """30 iterations: multiples of the distance, a remainder, one checkpoint only."""
     (whole, _), (g, products) = after_30_iterations(inner, None), after_30_iterations(inner, checkpoint)

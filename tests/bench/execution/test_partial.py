@@ -31,18 +31,22 @@ from gradient_routes.routes.model import Model
 from gradient_routes.routes.newton import Solver
 from gradient_routes.routes.route import Result, Route
 from gradient_routes.routes.tangent import tangent
+from gradient_routes.routes.unrolled_ad import unrolled_ad
 
 PARTS: dict[str, Callable[[Problem, Array], Subspace]] = {
     "components": lambda problem, p: components(problem, p, np.arange(0, len(p), 2)),
     "directions": lambda problem, p: directions(problem, p, 3, seed=1),
 }
+TRACED = (implicit_ad, unrolled_ad)
 SMALL = ("bar[n=1]", "bar[raw,alpha]", "duffing", "block[n=2]")
 
 
 def parts() -> Iterator[tuple[str, str, Route, dict]]:
-    """Directions by one set of options of every route: those know neither kind of part."""
-    cases = [case for case in pairs(iterated=("bar[raw,alpha]",)) if case[0] in SMALL]
-    yield from (("components", *case) for case in cases)
+    """Directions by one set of options of every route: those know neither kind of part. On the block, which compiles
+    long, what is traced has them alone.
+    """
+    cases = [case for case in pairs(iterated=()) if case[0] in SMALL]
+    yield from (("components", *case) for case in cases if case[0] != "block[n=2]" or case[1] not in TRACED)
     yield from (
         ("directions", *case) for case in {(name, route.name): (name, route, o) for name, route, o in cases}.values()
     )
@@ -66,9 +70,12 @@ def test_every_route_gives_that_part_of_the_whole(part: str, name: str, route: R
 
 
 @pytest.mark.parametrize(
-    ("part", "name", "route", "options"), [case for case in parts() if without_iterations(case[1], case[3])], ids=ids
+    ("part", "name", "route", "options"),
+    [case for case in parts() if case[1] != "block[n=2]" and without_iterations(case[1], case[3])],
+    ids=ids,
 )
 def test_the_part_has_its_declared_price(part: str, name: str, route: Route, options: dict) -> None:
+    """To the tolerance users have, where the test above is tight."""
     problem = ZOO[name]
     few = PARTS[part](problem, problem.parameters.start)
     _, counted, declared = differentiate(route, few, few.parameters.start, Solver(), **options)
@@ -309,7 +316,7 @@ def test_a_judge_too_dear_says_so() -> None:
     )
 
 
-BUILDS = {"box": BlackBox, "bar": Long, "duffing": Duffing, "block": lambda: Block(n=2)}
+BUILDS = {"box": BlackBox, "bar": Long, "duffing": Duffing, "block": lambda: Block(n=1, nz=2, law="linear")}
 ROWS = [(name, kind) for name in BUILDS for kind in PARTS if (name, kind) != ("block", "directions")]  # compiles long
 
 
@@ -331,9 +338,9 @@ def test_partial_rows_of_every_kind(name: str, kind: str) -> None:
 
 @pytest.mark.parametrize(
     ("part", "n", "of"),
-    [("--components", 10**6, "3 of 1000000 components"), ("--directions", 10**5, "3 random directions of 100000 p")],
+    [("--components", 2 * 10**5, "3 of 200000 components"), ("--directions", 10**5, "3 random directions of 100000 p")],
 )
-def test_a_few_of_a_million(cli, part: str, n: int, of: str) -> None:
+def test_a_few_of_very_many(cli, part: str, n: int, of: str) -> None:
     command = f"run --json --no-store --min-time 0 --problem bar[n={n}] --route tangent --route fd-central"
     for row in cli(*command.split(), part, "3").rows:
         assert (row["status"], row["n_param"]) == ("ok", n)

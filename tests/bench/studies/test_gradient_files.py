@@ -152,7 +152,8 @@ def test_sensitivities_of_the_data_equal_central_differences(cli, selector: str)
 
 
 @pytest.mark.parametrize(
-    "selector", ["block[n=2,cases=2]", "block[n=2,unknown=load,load=displacement]", "advection[n=4]"]
+    "selector",
+    ["block[n=2,cases=2,derivatives=hand]", "block[n=2,unknown=load,load=displacement,law=linear]", "advection[n=4]"],
 )
 def test_columns_on_the_mesh_equal_differences_of_its_fields(cli, selector: str) -> None:
     ran = cli(*RUN, selector, "--route", "tangent", "--vtu", "f.vtu", "--columns", "1")

@@ -169,7 +169,7 @@ def test_the_sentence_comes_first_and_the_jump_is_drawn(cli) -> None:
     assert any(line.startswith("not exact beside the event, worst error: fd-one-sided") for line in rest)
     assert "tend to the mean of the two slopes, -0.00226918" in ran.out
     assert "dJ/ds by complex-step" in ran.out
-    assert "dJ/ds by complex-step" not in run(cli, "bar[stop=multiplier]", "--no-plot").out
+    assert "dJ/ds by complex-step" not in run(cli, "bar[stop=multiplier]", "--no-plot", route="complex-step").out
 
 
 def test_json_rows_are_complete_and_kept(cli) -> None:
