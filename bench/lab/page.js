@@ -6,3 +6,7 @@ document.addEventListener("click", event => {
     () => { button.textContent = "copied"; setTimeout(() => { button.textContent = said }, 1200) },
     () => { getSelection().selectAllChildren(button.parentNode.querySelector("code")) });
 });
+document.addEventListener("focusin", event => { // the handle of a slider has its value, but no name for screen readers
+  const handle = event.composedPath()[0], title = handle.getRootNode().querySelector?.(".bk-slider-title");
+  if (title && handle.getAttribute("role") === "slider") handle.setAttribute("aria-label", title.textContent.split(":")[0]);
+});

@@ -16,6 +16,7 @@ def test_a_moved_modulus_and_a_sensor_move_every_number(page: Page, laboratory: 
     first = page.locator("td").first
     expect(first).to_have_text("0.125")
     page.locator(".noUi-handle").nth(1).focus()
+    expect(page.get_by_role("slider", name="E_2")).to_be_focused()  # a name for screen readers
     page.keyboard.press("ArrowRight")
     expect(page.locator("code").last).to_contain_text("--at")
     command = shlex.split(page.locator("code").last.inner_text())
