@@ -1,4 +1,4 @@
-"""What rows of commands look like on a page, one command a file: figures and tables that follow the rows as they come."""
+"""What rows of commands look like on a page, one command a file: figures and tables that follow the rows."""
 
 from __future__ import annotations
 

@@ -35,7 +35,12 @@ class Bill:
         self._reference = ColumnDataSource({"x": [], "g": [], "name": []})
         self._points = ColumnDataSource(self._columns([]))
         self._counts = ColumnDataSource(self._counted([]))
-        hover = [("route", "@route"), ("parameter", "@name"), ("dJ/dp", "@g{0.000000e}"), ("reference", "@exact{0.000000e}")]
+        hover = [
+            ("route", "@route"),
+            ("parameter", "@name"),
+            ("dJ/dp", "@g{0.000000e}"),
+            ("reference", "@exact{0.000000e}"),
+        ]
         self._g = plot(
             "parameter", "dJ/dp", title="dJ/dp; bars: the reference", hover=hover,
             x_range=Range1d(0.4, 1.6), y_range=Range1d(-1, 1),
@@ -43,7 +48,8 @@ class Bill:
         self._g.vbar("x", 0.85, "g", source=self._reference, color=INK, fill_alpha=0.25, line_color=INK)
         self._off = plot(
             "parameter", "|g - g_ref| / max |g_ref|", title="Error by component; 0 stands at 1e-18",
-            y_axis_type="log", hover=[*hover, ("error", "@error{0.0e}")], x_range=self._g.x_range, y_range=Range1d(1e-18, 1),
+            y_axis_type="log", hover=[*hover, ("error", "@error{0.0e}")], x_range=self._g.x_range,
+            y_range=Range1d(NOTHING, 1),
         )  # fmt: skip
         for drawn, y in ((self._g, "g"), (self._off, "shown")):
             drawn.scatter("x", y, source=self._points, marker="marker", angle="angle", color="colour", size=9)
@@ -54,7 +60,9 @@ class Bill:
         self._work.segment("x", "low", "x", "count", source=self._counts, color="colour", line_width=3)
         self._work.scatter("x", "count", source=self._counts, marker="marker", angle="angle", color="colour", size=10)
         self._work.xaxis.ticker = FixedTicker(ticks=[*range(1, len(WORK) + 1)])
-        self._work.xaxis.major_label_overrides = {i: words.replace(" ", "\n", 1) for i, words in enumerate(WORK.values(), start=1)}
+        self._work.xaxis.major_label_overrides = {
+            i: words.replace(" ", "\n", 1) for i, words in enumerate(WORK.values(), start=1)
+        }
         self._work.xgrid.visible = False
 
     def panel(self) -> pn.Column:
@@ -108,7 +116,12 @@ class Bill:
             found["error"] += errors
             found["shown"] += [None if e is None else max(e, NOTHING) for e in errors]
             found["name"] += row["parameters"]
-            for name, value in (("route", named(row)), ("marker", drawn), ("angle", angle), ("colour", colour(row["route"]))):
+            for name, value in (
+                ("route", named(row)),
+                ("marker", drawn),
+                ("angle", angle),
+                ("colour", colour(row["route"])),
+            ):
                 found[name] += [value] * n
         return found
 

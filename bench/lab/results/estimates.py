@@ -10,6 +10,7 @@ import panel as pn
 from bokeh.models import BoxAnnotation, ColumnDataSource, Range1d
 
 from gradient_routes.bench.lab.drawing import INK, colour, offer_picture, plot, span
+from gradient_routes.bench.lab.inverted import blind
 from gradient_routes.bench.lab.numbers import number, table
 
 NOISE = 2.0  # standard deviations within which residuals of a right model mostly lie
@@ -25,16 +26,16 @@ class Inversion:
         self.said = pn.pane.HTML("", sizing_mode="stretch_width")
         self.found = pn.pane.HTML("", sizing_mode="stretch_width")
         self._estimates = ColumnDataSource(estimates([]))
-        self._blind = ColumnDataSource({"x": [], "name": []})
+        self._blind = ColumnDataSource(blind([]))
         self._residuals = ColumnDataSource(residuals([]))
         self._of_p = plot(
             "parameter", "estimate, its own unit", height=300, x_range=Range1d(0.4, 8.6), y_range=Range1d(-1, 1),
             title="Estimates; squares: start; hatched: blind",
             hover=[("", "@name"), ("estimate", "@estimate"), ("+/-", "@sd"), ("start", "@start")],
         )  # fmt: skip
-        self._of_p.vbar(
-            "x", 0.9, 1e6, -1e6, source=self._blind, fill_alpha=0.0, line_color=None, hatch_pattern="/", hatch_color=INK,
-            hatch_alpha=0.5,
+        self._of_p.vstrip(
+            "left", "right", source=self._blind, fill_alpha=0.0, line_alpha=0.0, hatch_pattern="right_diagonal_line",
+            hatch_color=INK, hatch_alpha=0.5,
         )  # fmt: skip
         self._of_p.scatter("x", "start", source=self._estimates, marker="square", color=INK, size=6, fill_alpha=0.0)
         self._of_p.segment("x", "low", "x", "high", source=self._estimates, color=colour("adjoint"), line_width=2)
@@ -77,8 +78,7 @@ class Inversion:
         self.said.object = said(self.steps, self.tables.get("fit", []))
         self.found.object = listed(self.tables)
         self._estimates.data, self._residuals.data = p, r
-        blind = [(x, name) for x, name, of in zip(p["x"], p["name"], p["blind"], strict=True) if of]
-        self._blind.data = {"x": [x for x, _ in blind], "name": [name for _, name in blind]}
+        self._blind.data = blind(self.tables.get("estimates", []))
         for drawn, data in ((self._of_p, p), (self._of_r, r)):
             drawn.x_range.end = max(len(data["x"]), 1) + 0.6
         span(self._of_p.y_range, [*p["low"], *p["high"], *p["start"]])
@@ -94,18 +94,22 @@ def said(steps: Sequence[dict[str, Any]], fits: Sequence[dict[str, Any]]) -> str
         return ""
     last = steps[-1]
     if not last["says"]:
-        return f"<p>step {last['iteration']}: J = {number(last['objective'])}, {last['forward_solves']} forward solves</p>"
+        return (
+            f"<p>step {last['iteration']}: J = {number(last['objective'])}, {last['forward_solves']} forward solves</p>"
+        )
     lines = [f'<p id="ended">{html.escape(last["says"])}</p>']
     for fit in fits:
         kind = "good" if fit["verdict"] == "explained" else "bad"
-        noise = "" if fit["noise"] is None else f", noise {number(fit['noise'], 2)} ({html.escape(fit['noise_source'])})"
+        noise = (
+            "" if fit["noise"] is None else f", noise {number(fit['noise'], 2)} ({html.escape(fit['noise_source'])})"
+        )
         chi2 = "" if fit["chi2"] is None else f", chi<sup>2</sup> per datum {number(fit['chi2'], 3)}"
         mark = f'<span aria-hidden="true">{"✓" if kind == "good" else "✗"}</span>'
         word = f'<span class="verdict {kind}">{html.escape(fit["verdict"])}</span>'
         rms = number(fit["rms"], 2)
         lines.append(
-            f'<p id="fit">{mark} {"the data are " if kind == "good" else ""}{word}: {fit["data"]} data, rms of residuals '
-            f"{rms}{noise}{chi2}</p>"
+            f'<p id="fit">{mark} {"the data are " if kind == "good" else ""}{word}: {fit["data"]} data, '
+            f"rms of residuals {rms}{noise}{chi2}</p>"
         )
     return f'<div class="judged" role="status">{"".join(lines)}</div>'
 
@@ -115,7 +119,8 @@ def listed(tables: dict[str, list[dict[str, Any]]]) -> str:
     rows = tables.get("estimates", [])
     lines = [
         [
-            html.escape(row["parameter"]), *("" if row[k] is None else number(row[k], 6) for k in ("start", "estimate")),
+            html.escape(row["parameter"]),
+            *("" if row[k] is None else number(row[k], 6) for k in ("start", "estimate")),
             "" if row["sd"] is None else number(row["sd"], 3), "blind" if row["blind"] else "",
         ]
         for row in rows[:MOST]
@@ -141,7 +146,6 @@ def estimates(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
         "sd": [row["sd"] for row in rows],
         "low": [v - s for v, s in zip(values, sd, strict=True)],
         "high": [v + s for v, s in zip(values, sd, strict=True)],
-        "blind": [bool(row["blind"]) for row in rows],
     }
 
 

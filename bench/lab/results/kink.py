@@ -45,7 +45,9 @@ class Kink:
         self._of_slope.scatter(
             "s", "slope", source=self._slopes, marker="marker", angle="angle", color="colour", size=7
         )
-        self._event = [Span(dimension="height", location=1, line_color=INK, line_dash="dashed", visible=False) for _ in "12"]
+        self._event = [
+            Span(dimension="height", location=1, line_color=INK, line_dash="dashed", visible=False) for _ in "12"
+        ]
         for drawn, event in zip((self._of_J, self._of_slope), self._event, strict=True):
             drawn.add_layout(event)
 
@@ -123,8 +125,13 @@ def listed(rows: Sequence[dict[str, Any]]) -> str:
     lines = []
     for route in dict.fromkeys(name for name, _ in sides):
         both = [sides[route, side] for side in ("left", "right")]
-        numbers = [["" if row[key] is None else number(row[key], digits) for row in both] for key, digits in (("slope", 6), ("gradient_error", 2))]
+        numbers = [
+            ["" if row[key] is None else number(row[key], digits) for row in both]
+            for key, digits in (("slope", 6), ("gradient_error", 2))
+        ]
         lines.append([swatch(route), *numbers[0], *numbers[1]])
-    skipped = [f"<p>{swatch(row['route'])}: {html.escape(row['reason'])}</p>" for row in rows if row["status"] == "skipped"]
+    skipped = [
+        f"<p>{swatch(row['route'])}: {html.escape(row['reason'])}</p>" for row in rows if row["status"] == "skipped"
+    ]
     head = ["route", "dJ/ds left", "dJ/ds right", "error left", "error right"]
     return text + (table(head, lines) if lines else "") + "".join(skipped)

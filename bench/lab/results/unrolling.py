@@ -26,7 +26,12 @@ class Unrolling:
         self.fits: list[dict[str, Any]] = []
         self.table = pn.pane.HTML("", sizing_mode="stretch_width")
         self._points = ColumnDataSource({name: [] for name in COLUMNS})
-        hover = [("k", "@iterations"), ("dJ/dp", "@gradient_error{0.0e}"), ("J", "@objective_error{0.0e}"), ("tape", "@tape_bytes byte")]
+        hover = [
+            ("k", "@iterations"),
+            ("dJ/dp", "@gradient_error{0.0e}"),
+            ("J", "@objective_error{0.0e}"),
+            ("tape", "@tape_bytes byte"),
+        ]
         self._x = Range1d(0.8, 16)
         self._errors = plot(
             "k, iterations on the tape", "error, relative",
@@ -44,7 +49,9 @@ class Unrolling:
         ):
             drawn.line("iterations", column, source=self._points, color=ink, line_dash=dash, line_width=2)
             drawn.scatter("iterations", column, source=self._points, color=ink, size=7)
-        self._implicit = Span(dimension="width", location=1, line_color=colour("implicit-ad"), line_dash="dotted", visible=False)
+        self._implicit = Span(
+            dimension="width", location=1, line_color=colour("implicit-ad"), line_dash="dotted", visible=False
+        )
         self._errors.add_layout(self._implicit)
 
     def panel(self) -> pn.Column:
@@ -81,5 +88,3 @@ def cells(row: dict[str, Any]) -> list[str]:
     errors = ("" if row[name] is None else number(row[name], 2) for name in ("gradient_error", "objective_error"))
     status = row["status"] if row["status"] == "ok" else f"{row['status']}: {row['reason'] or ''}"
     return [str(row["iterations"]), *errors, bytes_(row["tape_bytes"]), str(row["products"] or ""), html.escape(status)]
-
-

@@ -38,7 +38,10 @@ class VCurve:
         self._drawn.multi_line("xs", "ys", source=self._lines, color="colour", line_dash="dash", line_width=1.5)
         self._drawn.scatter("h", "error", source=self._points, marker="marker", color="colour", size=5)
         look = {"line_color": INK, "line_dash": "dashed", "visible": False}
-        self._floor, self._best = Span(dimension="width", location=1, **look), Span(dimension="height", location=1, **look)
+        self._floor, self._best = (
+            Span(dimension="width", location=1, **look),
+            Span(dimension="height", location=1, **look),
+        )
         self._drawn.add_layout(self._floor)
         self._drawn.add_layout(self._best)
 
@@ -93,7 +96,9 @@ def facts(check: dict[str, Any]) -> str:
         ]
         for f in check["findings"]
     ]  # fmt: skip
-    wrong = [[html.escape(w["name"]), *(number(w[key], 6) for key in ("given", "found"))] for w in check["worst_components"]]
+    wrong = [
+        [html.escape(w["name"]), *(number(w[key], 6) for key in ("given", "found"))] for w in check["worst_components"]
+    ]
     parts = [table(["of the deciding line", ""], known)]
     parts += [table(["component that differs", "gradient", "differences"], wrong)] if wrong else []
     evidence = table(["evidence", "value", "limit", "", "says"], tests)

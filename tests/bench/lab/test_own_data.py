@@ -76,9 +76,9 @@ def test_files_lie_in_their_folder_under_plain_names(tmp_path: Path) -> None:
 
 
 def test_error_bars_are_drawn_where_there_are_some() -> None:
-    row = {"parameter": "log E_1", "start": 0.0, "estimate": 1.0, "sd": 0.25, "blind": 0}
-    drawn = estimates([row, row | {"sd": None, "blind": 1}])
-    assert (drawn["low"], drawn["high"], drawn["blind"]) == ([0.75, 1.0], [1.25, 1.0], [False, True])
+    row = {"parameter": "log E_1", "start": 0.0, "estimate": 1.0, "sd": 0.25}
+    drawn = estimates([row, row | {"sd": None}])
+    assert (drawn["low"], drawn["high"]) == ([0.75, 1.0], [1.25, 1.0])
 
 
 def test_a_model_that_does_not_explain_the_data_is_told() -> None:
