@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import asyncio
 import atexit
-import tempfile
 from functools import cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from gradient_routes.bench.lab import check_installed
 from gradient_routes.problems.errors import InputError
 
 if TYPE_CHECKING:
@@ -41,13 +42,12 @@ def derivation(**state: str) -> pn.Column:
 
 def shown(slug: str, state: dict[str, str]) -> pn.Column:
     """A part by the last word of its URL."""
-    try:
-        import panel as pn
+    check_installed()
+    import panel as pn
 
-        from gradient_routes.bench.lab.page import inside
-        from gradient_routes.bench.lab.parts import load
-    except ModuleNotFoundError as missing:
-        raise InputError(f"lab: {missing.name} is not installed - pip install 'gradient-routes[lab]'") from missing
+    from gradient_routes.bench.lab.page import inside
+    from gradient_routes.bench.lab.parts import load
+
     try:
         asyncio.get_running_loop()
     except RuntimeError:
@@ -62,12 +62,14 @@ def shown(slug: str, state: dict[str, str]) -> pn.Column:
 
 @cache
 def _place() -> Place:
-    """One for the whole notebook."""
+    """One for the whole notebook; its processes and its folder end with it."""
     from gradient_routes.bench.lab.part import Place
     from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
 
+    folder = TemporaryDirectory(prefix="routes-lab-")
+    atexit.register(folder.cleanup)
     pools = Pool(QUICK), Pool(LONG)
     for pool in pools:
         pool.warm()
         atexit.register(pool.close)
-    return Place(*pools, Path(tempfile.mkdtemp(prefix="routes-lab-")))
+    return Place(*pools, Path(folder.name))

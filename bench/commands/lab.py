@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -11,12 +10,12 @@ import click
 from gradient_routes.bench.command_options import complain, debug_option, store_option
 from gradient_routes.bench.commands.group import INTERRUPTED, leave
 from gradient_routes.bench.commands.interrupts import over
+from gradient_routes.bench.lab import check_installed
 from gradient_routes.bench.ranges import Whole
 from gradient_routes.bench.sanitize import echo
 from gradient_routes.problems.errors import InputError
 
 PORT = "0: any that is free."
-NEEDED = ("panel", "bokeh", "latex2mathml")
 
 
 @click.command()
@@ -30,8 +29,7 @@ def lab(port: int, browser: bool, store: Path) -> None:
     What moves on a page is computed by commands of `routes`, which it shows. It listens on this machine only.
     In a notebook: gradient_routes.lab.bar().
     """
-    if missing := [name for name in NEEDED if find_spec(name) is None]:
-        raise InputError(f"lab: {', '.join(missing)} not installed - pip install 'gradient-routes[lab]'")
+    check_installed()
     import webbrowser
 
     from gradient_routes.bench.lab.server import Laboratory

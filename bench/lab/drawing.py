@@ -53,8 +53,6 @@ def plot(
     )
     legend = Legend(orientation="horizontal", border_line_color=None, background_fill_alpha=0.0, stylesheets=[LABELS])
     drawn.add_layout(legend, "above")
-    if title:
-        drawn.title.text_font_size = "12px"
     if hover:
         drawn.add_tools(HoverTool(tooltips=[*hover]))
     return drawn

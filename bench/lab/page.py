@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from html import escape
 from importlib.resources import files
 
 import panel as pn
 from bokeh.document import Document
+from jinja2 import Template
 from panel.io.location import Location
 
 from gradient_routes.bench.lab.part import Part
@@ -54,10 +56,6 @@ def page(part: Part) -> pn.Template:
 
 def overview() -> str:
     """The first page: what there is."""
-    from html import escape
-
-    from jinja2 import Template
-
     cards = "".join(
         f'<a href="/{slug}"><h2>{escape(load(slug).title)}</h2><p>{escape(load(slug).lead)}</p></a>' for slug in PARTS
     )

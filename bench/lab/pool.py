@@ -180,14 +180,15 @@ class Pool:
             self._turns.release()
 
         loop.run_in_executor(self._threads, listen).add_done_callback(free)
+        message: Message = None
         try:
             yield Begun()
-            message: Message = None
             while not isinstance(message, Ended):
                 message = await heard.get()
                 yield message
         finally:
-            worker.leave()
+            if not isinstance(message, Ended):  # else it may do the next job already
+                worker.leave()
 
     def _tell(self) -> None:
         if self._turns.locked():

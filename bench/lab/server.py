@@ -8,11 +8,10 @@ import re
 import shutil
 import signal
 import socket
-import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import cast
 
 import panel as pn
@@ -54,7 +53,7 @@ class Laboratory:
 
     def session(self, slug: str) -> pn.Template:
         """A new session: one page with its part, as its URL says."""
-        folder = Path(tempfile.mkdtemp(dir=self.root))
+        folder = Path(mkdtemp(dir=self.root))
         query = pn.state.location.query_params if pn.state.location is not None else {}
         part = load(slug)(Place(*self.pools, folder, self.store), {name: str(value) for name, value in query.items()})
 
