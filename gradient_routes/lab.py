@@ -22,7 +22,7 @@ from gradient_routes.problems.errors import InputError
 if TYPE_CHECKING:
     import panel as pn
 
-    from gradient_routes.bench.lab.part import Place
+    from gradient_routes.bench.lab.place import Place
 
 __all__ = ["bar", "derivation"]
 
@@ -63,7 +63,7 @@ def shown(slug: str, state: dict[str, str]) -> pn.Column:
 @cache
 def _place() -> Place:
     """One for the whole notebook; its processes and its folder end with it."""
-    from gradient_routes.bench.lab.part import Place
+    from gradient_routes.bench.lab.place import Place
     from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
 
     folder = TemporaryDirectory(prefix="routes-lab-")

@@ -7,9 +7,7 @@ import html
 import shlex
 from collections.abc import Callable, Mapping
 from contextlib import aclosing
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import urlencode
 
@@ -18,32 +16,16 @@ import param
 from bokeh.document import Document
 
 from gradient_routes.bench.cases.status import Status
-from gradient_routes.bench.command_options import STORE
 from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import Begun, Pool
 from gradient_routes.bench.lab.shell import Command, Exited, Said
+from gradient_routes.bench.lab.state import read, written
 from gradient_routes.problems.errors import InputError
 
 WRONG_USAGE = 2
-NONE = "none"  # a list without items: a browser leaves out what is empty
 TOGETHER = 10  # [ms] in which changes are gathered: every message to a browser has its price
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a part computes.
-
-    quick   for what follows every move of a slider
-    long    for what is asked for by a button
-    folder  of this session alone: uploads, and what commands read
-    store   that is looked at
-    """
-
-    quick: Pool
-    long: Pool
-    folder: Path
-    store: Path = STORE
 
 
 class Part(param.Parameterized):
@@ -66,6 +48,7 @@ class Part(param.Parameterized):
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
         self._moves, self._waits, self.pushed = 0, False, nothing
+        self.drawn: tuple[pn.viewable.Viewable, ...] = ()
         self._changes: list[Callable[[], None]] = []
         self._following: asyncio.Task[None] | None = None
         self._refused = self._read(query or {})
@@ -93,11 +76,8 @@ class Part(param.Parameterized):
         return self.place.quick if self.at_once else self.place.long
 
     def content(self) -> pn.viewable.Viewable:
-        """What is seen. Asked for once."""
+        """What is seen; asked for once. `drawn` is set to what fades while it is not of the state."""
         raise NotImplementedError
-
-    def leave(self) -> None:
-        """The state has changed and waits for `start`: what is drawn is that of another one."""
 
     def queue(self, before: int) -> None:
         """The job waits; so many are before it."""
@@ -157,25 +137,33 @@ class Part(param.Parameterized):
     def _changed(self, *_: Any) -> None:
         self._refused = []
         with pn.io.hold(self._document):
-            self._show()
+            refused = self._show()
         if self.at_once:
             self.start()
         else:
-            self.leave()
+            self._fade(True)
+            self.say(refused or "changed: press Run to compute it", bad=bool(refused))
 
-    def _show(self) -> None:
-        """The command and the URL of the state."""
+    def _fade(self, faded: bool) -> None:
+        """What is drawn is that of another state, or of this one again."""
+        for panel in self.drawn:
+            panel.styles = {"opacity": "0.4" if faded else "1"}  # no styles would leave it as it is
+
+    def _show(self) -> str:
+        """The command and the URL of the state; why there is no command."""
         link = f'<button type="button" class="copy" data-link="{html.escape(self.url())}">copy link</button>'
         try:
             text = html.escape(f"routes {shlex.join(self.command())}")
-        except InputError:  # why not is said by who is to run it
-            shown = f"<code></code>{link}"
+        except InputError as error:
+            refused, shown = str(error), f"<code></code>{link}"
         else:
+            refused = ""
             copy = f'<button type="button" class="copy" data-copy="{text}">copy command</button>'
             shown = f'<code tabindex="0">{text}</code>{copy}{link}'
         self.shown.object = f'<div class="command">{shown}</div>'
         if pn.state.location is not None and self._document is not None:
             pn.state.location.search = f"?{self.query()}".rstrip("?")
+        return refused
 
     def start(self) -> None:
         """Compute the newest state, now or when what runs has ended."""
@@ -202,7 +190,7 @@ class Part(param.Parameterized):
             try:
                 job = self.job()
             except InputError as error:
-                self._later(self.say, str(error))
+                self._later(self._refuse, str(error))
             else:
                 await self._run(job)
 
@@ -228,15 +216,21 @@ class Part(param.Parameterized):
                 self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
             raise
 
+    def _refuse(self, reason: str) -> None:
+        self._fade(True)
+        self.say(reason)
+
     def _begun(self) -> None:
         if self._waits:
             self._waits = False
             self.say()
+        self._fade(False)
         self.begin()
 
     def _ended(self, end: Ended, code: int, said: list[str]) -> None:
         failed = end.status is not Status.OK
         self.say(*said, *([end.line(self.slug)] if failed else []), bad=failed or code == WRONG_USAGE)
+        self._fade(failed)
         self.end(end, code)
 
     def _later(self, change: Callable[..., None], *arguments: Any) -> None:
@@ -258,29 +252,3 @@ class Part(param.Parameterized):
 
 def nothing() -> None:
     """A document sends its changes by itself; a notebook is told to."""
-
-
-def written(value: Any) -> str:
-    """A value of a state as text."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, list):
-        return ",".join(map(written, value)) or NONE
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
-
-
-def read(declared: param.Parameter, text: str) -> Any:
-    """A value of a state from text. Raises ValueError; that it is within its bounds is for the parameter to say."""
-    match declared:
-        case param.Boolean():
-            if text not in ("yes", "no"):
-                raise ValueError("is yes or no")
-            return text == "yes"
-        case param.Integer():
-            return int(text)
-        case param.Number():
-            return None if text == "None" else float(text)
-        case param.List():
-            kind = declared.item_type or str
-            return [kind(item) for item in text.split(",") if item] if text != NONE else []
-    return text

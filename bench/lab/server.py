@@ -22,8 +22,8 @@ from tornado.web import HTTPError, RequestHandler
 
 from gradient_routes.bench.command_options import STORE
 from gradient_routes.bench.lab.page import overview, page
-from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts import PARTS, load
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import LONG, QUICK, Pool
 
 LOOPBACK = "127.0.0.1"

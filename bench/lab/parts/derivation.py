@@ -14,8 +14,9 @@ from gradient_routes.bench.lab.algebra import Algebra, WithAlgebra
 from gradient_routes.bench.lab.drawing import INK, colour, plot
 from gradient_routes.bench.lab.formula import with_formulas
 from gradient_routes.bench.lab.numbers import matrix, number, table, vector
-from gradient_routes.bench.lab.part import Part, written
+from gradient_routes.bench.lab.part import Part
 from gradient_routes.bench.lab.shell import Command, Row
+from gradient_routes.bench.lab.state import option, written
 
 N = 8
 LN2 = float(np.log(2.0))
@@ -65,16 +66,8 @@ class Derivation(Part):
 
     def command(self) -> tuple[str, ...]:
         routes = ("--route", "tangent", "--route", "adjoint")
-        at = ("--at", self.at) if self.at[0] != "-" else (f"--at={self.at}",)
-        return (
-            "run",
-            "--problem",
-            self.selector,
-            *routes,
-            *(at if any(self.octaves) else ()),
-            "--gradient",
-            "--no-timing",
-        )
+        at = option("at", self.at) if any(self.octaves) else ()
+        return ("run", "--problem", self.selector, *routes, *at, "--gradient", "--no-timing")
 
     def job(self) -> WithAlgebra:
         return WithAlgebra(Command(self.command(), self.place.folder), self.selector, self.at)
@@ -91,6 +84,7 @@ class Derivation(Part):
         for name, line in LINES.items():
             steps += [pn.pane.HTML(with_formulas(line), sizing_mode="stretch_width"), self._live[name]]
             steps += [figures[name]] if name in figures else []
+        self.drawn = (*self._live.values(), *figures.values())
         return pn.Column(self._controls(), *steps, sizing_mode="stretch_width")
 
     def _controls(self) -> pn.Column:

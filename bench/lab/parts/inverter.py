@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import shlex
+from typing import get_args
 
 import panel as pn
 import param
@@ -13,16 +14,18 @@ from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Message
 from gradient_routes.bench.lab import inverted
 from gradient_routes.bench.lab.inverter_figures import Figures
-from gradient_routes.bench.lab.part import Part, written
+from gradient_routes.bench.lab.part import Part
 from gradient_routes.bench.lab.pool import Pool
 from gradient_routes.bench.lab.shell import Command, Commands, Row
+from gradient_routes.bench.lab.state import written
+from gradient_routes.problems.contact import StopName
 
 N = 8
 MOST = 200  # iterations of a whole run
 DRAWS = 20
 SWEEP = ("1e-8", "1", "9")  # weights alpha of redrawn noise
 OPTIMIZERS = ["lbfgs", "gauss-newton", "descent", "trust"]
-STOPS = ["none", "penalty", "softplus", "quadratic", "multiplier"]
+STOPS = [*get_args(StopName)]
 READ = """<p><b>Bars</b>: estimates at iterate k, 0 being the start. <b>Dashes</b>: the truth. <b>Hatched</b>: blind, no
     datum depends on the element. Below them what the gradient is made of: A L E times the strain of u times that of λ;
     diamonds are the whole of dJ/d log E, with the share of α Φ.</p>"""
@@ -104,6 +107,7 @@ class Inverter(Part):
         aligned = pn.Column(*(pn.pane.Bokeh(each, sizing_mode="stretch_width") for each in drawn))
         tradeoff = pn.pane.Bokeh(self.figures.tradeoff, sizing_mode="stretch_width")
         self._redrawn = pn.Column(self._spread, tradeoff, sizing_mode="stretch_width", visible=False)
+        self.drawn = (self._meter, self._verdict, aligned, self._redrawn, self._numbers)
         return pn.Column(
             self._controls(),
             self._meter,

@@ -17,6 +17,7 @@ from gradient_routes.bench.lab.results.unrolling import Unrolling
 from gradient_routes.bench.lab.results.vcurve import VCurve
 from gradient_routes.bench.lab.running import Running
 from gradient_routes.bench.lab.shell import Row
+from gradient_routes.problems.contact import StopName
 from gradient_routes.problems.errors import InputError
 from gradient_routes.routes.faulty_adjoint import Fault
 
@@ -32,7 +33,7 @@ TOLERANCES = (RTOL, "1e-10", "1e-8", "1e-6", "1e-4", "1e-3", "1e-2")
 SOLVERS = {"auto: direct": "auto", "krylov: ends at rtol": "krylov", "descent: ends at rtol": "descent"}
 STEPS = (DEFAULT, *(f"{digit}e-{k}" for k in range(16, 0, -1) for digit in (1, 3)), "1")
 ITERATIONS = (DEFAULT, *map(str, (1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 24, 32, 64, 128, 256, 512)))
-STOPS = ("none", "penalty", "softplus", "quadratic", "multiplier")
+STOPS = get_args(StopName)
 SHORT = ("--points", "17")  # of a sweep
 FAULTS = get_args(get_args(Fault)[0])
 WRAPPED = ".bk-input-group { flex-wrap: wrap; gap: .1rem .9rem }"
@@ -127,19 +128,16 @@ class Laboratory(Part):
     # what is seen
 
     def content(self) -> pn.Column:
-        self._results: dict[str, Result] = {
-            "gradient": Bill(), "vcurve": VCurve(), "kink": Kink(), "unrolling": Unrolling(),
-        }  # fmt: skip
-        self._panels = {name: result.panel() for name, result in self._results.items()}
-        self._fresh, self._drawn, self._choosing = False, self.mode, False
+        results: dict[str, Result] = {"gradient": Bill(), "vcurve": VCurve(), "kink": Kink(), "unrolling": Unrolling()}
+        self._running = Running(self, results)
+        self._choosing = False
         self._controls = self._widgets()
-        self._running = Running(self)
         self.param.watch(self._fit, ["mode", "problem", "routes", "judged"])
         self._fit()
         first = [self._controls[name] for name in ALWAYS]
         more = [widget for name, widget in self._controls.items() if name not in ALWAYS]
         above = pn.FlexBox(*first), pn.FlexBox(*more), self._running.panel(), self.status, self.shown
-        return pn.Column(*above, *self._panels.values(), sizing_mode="stretch_width")
+        return pn.Column(*above, *self._running.panels.values(), sizing_mode="stretch_width")
 
     def _widgets(self) -> dict[str, pn.viewable.Viewable]:
         of, narrow = self.param, {"width": 150}
@@ -189,7 +187,7 @@ class Laboratory(Part):
         self._choosing = False
         for name, widget in self._controls.items():
             widget.visible = name in ALWAYS or (name in SHOWN[self.mode] and self._matters(name))
-        for name, panel in self._panels.items():
+        for name, panel in self._running.panels.items():
             panel.visible = name == self.mode
         self._running.follow()
 
@@ -206,11 +204,7 @@ class Laboratory(Part):
     # what comes
 
     def begin(self) -> None:
-        self._fresh, self._drawn = True, self.mode
-        self._running.begin(self.expected)
-
-    def leave(self) -> None:
-        self._running.leave(*self._panels.values())
+        self._running.begin(self.mode, self.expected)
 
     def queue(self, before: int) -> None:
         super().queue(before)
@@ -218,17 +212,7 @@ class Laboratory(Part):
 
     def take(self, message: Message) -> None:
         if isinstance(message, Row):
-            self._renew()
-            self._results[self._drawn].take(message.value)
-            self._running.row()
+            self._running.take(message.value)
 
     def end(self, end: Ended, code: int) -> None:
-        self._renew()
-        self._results[self._drawn].close()
         self._running.end()
-
-    def _renew(self) -> None:
-        """What was drawn before goes when the first row comes."""
-        if self._fresh:
-            self._results[self._drawn].clear()
-            self._fresh = False

@@ -13,7 +13,6 @@ from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.lab import chosen, upload
 from gradient_routes.bench.lab.part import Part
-from gradient_routes.bench.lab.results import Result
 from gradient_routes.bench.lab.results.estimates import Inversion
 from gradient_routes.bench.lab.results.identified import Identified
 from gradient_routes.bench.lab.running import Running
@@ -74,10 +73,7 @@ class OwnData(Part):
     # what is seen
 
     def content(self) -> pn.Column:
-        self._results: dict[str, Result] = {"invert": Inversion(), "identify": Identified()}
-        self._panels = {name: result.panel() for name, result in self._results.items()}
-        self._running = Running(self)
-        self._fresh, self._drawn = False, self.mode
+        self._running = Running(self, {"invert": Inversion(), "identify": Identified()})
         self._take_along = pn.widgets.FileDownload(
             callback=self._estimates, filename=ESTIMATES, label="Estimates as CSV", embed=False, auto=True, width=200,
             disabled=True,
@@ -96,7 +92,7 @@ class OwnData(Part):
         self._fit()
         return pn.Column(
             pn.FlexBox(self._dropped, example), pn.FlexBox(*self._widgets(), self._optimizer), self._running.panel(),
-            self.status, self.shown, *self._panels.values(), self._take_along, sizing_mode="stretch_width",
+            self.status, self.shown, *self._running.panels.values(), self._take_along, sizing_mode="stretch_width",
         )  # fmt: skip
 
     def _widgets(self) -> list[pn.widgets.Widget]:
@@ -113,7 +109,7 @@ class OwnData(Part):
 
     def _fit(self, *_: Any) -> None:
         self._optimizer.visible = self.mode == "invert"
-        for name, panel in self._panels.items():
+        for name, panel in self._running.panels.items():
             panel.visible = name == self.mode and bool(self.data)
         self._take_along.visible = self.mode == "invert" and bool(self.data)
         self._running.follow()
@@ -137,12 +133,8 @@ class OwnData(Part):
     # what comes
 
     def begin(self) -> None:
-        self._fresh, self._drawn = True, self.mode
         self._take_along.disabled = True
-        self._running.begin()
-
-    def leave(self) -> None:
-        self._running.leave(*self._panels.values())
+        self._running.begin(self.mode)
 
     def queue(self, before: int) -> None:
         super().queue(before)
@@ -150,18 +142,8 @@ class OwnData(Part):
 
     def take(self, message: Message) -> None:
         if isinstance(message, Row):
-            self._renew()
-            self._results[self._drawn].take(message.value)
-            self._running.row()
+            self._running.take(message.value)
 
     def end(self, end: Ended, code: int) -> None:
-        self._renew()
-        self._results[self._drawn].close()
         self._running.end()
         self._take_along.disabled = not self._estimates().is_file()
-
-    def _renew(self) -> None:
-        """What was drawn before goes when the first row comes."""
-        if self._fresh:
-            self._results[self._drawn].clear()
-            self._fresh = False

@@ -14,6 +14,7 @@ from gradient_routes.bench.execution.isolation.channel import Call
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
 from gradient_routes.bench.lab import looking
 from gradient_routes.bench.lab.part import Part
+from gradient_routes.bench.lab.state import option
 from gradient_routes.bench.store.filter import COLUMNS, Filter
 from gradient_routes.bench.store.schema import tables
 from gradient_routes.bench.store.store import Store
@@ -52,8 +53,8 @@ class KeptRows(Part):
     def command(self) -> tuple[str, ...]:
         where = self.where
         given = [(name, value) for name in (*COLUMNS, "search") if (value := getattr(where, name))]
-        filters = [word for name, value in given for word in _option(name, value)]
-        store = [] if self.place.store == STORE else _option("store", str(self.place.store))
+        filters = [word for name, value in given for word in option(name, value)]
+        store = () if self.place.store == STORE else option("store", str(self.place.store))
         if self.show == "figures":
             return ("report", "-o", "report.html", *filters, *store)
         return ("export", "--table", self.table, *filters, *store)
@@ -66,6 +67,7 @@ class KeptRows(Part):
 
     def content(self) -> pn.Column:
         self._seen = pn.pane.HTML("", sizing_mode="stretch_width", min_height=200)
+        self.drawn = (self._seen,)
         self._count = pn.pane.HTML("", sizing_mode="stretch_width")
         self._selects = {name: self._select(name) for name in (*COLUMNS, "section")}
         self._earlier, self._later_rows = (
@@ -149,7 +151,3 @@ class KeptRows(Part):
     def end(self, end: Ended, code: int) -> None:
         if end.reason:
             self._seen.object = self._count.object = ""
-
-
-def _option(name: str, value: str) -> list[str]:
-    return [f"--{name}={value}"] if value.startswith("-") else [f"--{name}", value]

@@ -17,8 +17,9 @@ from gradient_routes.bench.execution.isolation.messages import Message
 from gradient_routes.bench.lab.advice import Advise, Curves, answer, bill_table, glossary
 from gradient_routes.bench.lab.drawing import INK, colour, plot
 from gradient_routes.bench.lab.numbers import table
-from gradient_routes.bench.lab.part import Part, written
+from gradient_routes.bench.lab.part import Part
 from gradient_routes.bench.lab.shell import Row
+from gradient_routes.bench.lab.state import written
 from gradient_routes.bench.units import duration
 
 MANY = (1, 10**9)
@@ -84,6 +85,7 @@ class WhichRoute(Part):
             drawn.line("n_p", name, source=self._curves, **look)
         drawn.line("x", "y", source=self._here, color=INK, line_dash="dotted")
         drawn.legend.location = "top_left"
+        self.drawn = (self._answer, self._bills, self._alternatives)
         words = pn.pane.HTML(glossary(), sizing_mode="stretch_width")
         figure = pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
         return pn.Column(

@@ -15,8 +15,8 @@ from playwright.sync_api import Page, expect
 from gradient_routes.bench.lab import inverted
 from gradient_routes.bench.lab.inverter_figures import LEFT
 from gradient_routes.bench.lab.numbers import number
-from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts.inverter import DRAWS, MOST, Inverter, N
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import Pool
 
 Cli = Callable[..., Ran]

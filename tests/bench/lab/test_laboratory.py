@@ -15,8 +15,8 @@ from playwright.sync_api import Page, expect
 
 from gradient_routes.bench.lab import chosen
 from gradient_routes.bench.lab.numbers import number
-from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts.laboratory import Laboratory
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import Pool
 from gradient_routes.bench.lab.results.bill import Bill, work
 from gradient_routes.bench.lab.results.kink import joined, slopes
@@ -223,4 +223,4 @@ def test_a_route_that_does_not_apply_says_why_and_a_long_run_is_stopped(page: Pa
     expect(stop).to_be_disabled()
     page.get_by_label("Further options of the problem").fill("mesh=/etc/passwd")
     page.keyboard.press("Enter")
-    expect(page.locator("code").last).to_contain_text("takes no others")
+    expect(page.locator("p[role=status]").first).to_contain_text("takes no others")

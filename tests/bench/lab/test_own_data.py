@@ -14,8 +14,8 @@ from playwright.sync_api import FilePayload, Page, expect
 
 from gradient_routes.bench.lab import upload
 from gradient_routes.bench.lab.numbers import number
-from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts.own_data import ESTIMATES, EXAMPLE, READINGS, OwnData
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import Pool
 from gradient_routes.bench.lab.results.estimates import estimates, said
 from gradient_routes.problems.errors import InputError

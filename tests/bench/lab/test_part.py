@@ -15,7 +15,8 @@ import pytest
 
 from gradient_routes.bench.cases.status import Status
 from gradient_routes.bench.execution.isolation.messages import Ended
-from gradient_routes.bench.lab.part import Part, Place
+from gradient_routes.bench.lab.part import Part
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import Pool
 from gradient_routes.bench.lab.shell import Command, Exited, Row, Said
 from gradient_routes.problems.errors import InputError

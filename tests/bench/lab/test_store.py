@@ -14,8 +14,8 @@ from playwright.sync_api import Page, expect
 
 from benchmarks.invented_store import fill
 from gradient_routes.bench.lab import looking
-from gradient_routes.bench.lab.part import Place
 from gradient_routes.bench.lab.parts.store import KeptRows
+from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.store.filter import Filter
 from gradient_routes.bench.store.schema import tables
 from gradient_routes.bench.store.store import SCHEMA, Store

@@ -1,0 +1,40 @@
+"""Values of a state as text, in URLs and commands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import param
+
+NONE = "none"  # a list without items: a browser leaves out what is empty
+
+
+def written(value: Any) -> str:
+    """A value of a state as text."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ",".join(map(written, value)) or NONE
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def read(declared: param.Parameter, text: str) -> Any:
+    """A value of a state from text. Raises ValueError; that it is within its bounds is for the parameter to say."""
+    match declared:
+        case param.Boolean():
+            if text not in ("yes", "no"):
+                raise ValueError("is yes or no")
+            return text == "yes"
+        case param.Integer():
+            return int(text)
+        case param.Number():
+            return None if text == "None" else float(text)
+        case param.List():
+            kind = declared.item_type or str
+            return [kind(item) for item in text.split(",") if item] if text != NONE else []
+    return text
+
+
+def option(name: str, value: str) -> tuple[str, ...]:
+    """Words of a command for an option with a value, which may begin with a minus."""
+    return (f"--{name}={value}",) if value.startswith("-") else (f"--{name}", value)
