@@ -47,7 +47,8 @@ class Part(param.Parameterized):
         self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
-        self._moves, self._waits, self.pushed = 0, False, nothing
+        self._moves, self._waits = 0, False
+        self.pushed: Callable[[], None] = lambda: None  # a document sends its changes by itself, a notebook is told to
         self.drawn: tuple[pn.viewable.Viewable, ...] = ()
         self._changes: list[Callable[[], None]] = []
         self._following: asyncio.Task[None] | None = None
@@ -141,8 +142,7 @@ class Part(param.Parameterized):
         if self.at_once:
             self.start()
         else:
-            self._fade(True)
-            self.say(refused or "changed: press Run to compute it", bad=bool(refused))
+            self._leave(refused or "changed: press Run to compute it", bad=bool(refused))
 
     def _fade(self, faded: bool) -> None:
         """What is drawn is that of another state, or of this one again."""
@@ -190,7 +190,7 @@ class Part(param.Parameterized):
             try:
                 job = self.job()
             except InputError as error:
-                self._later(self._refuse, str(error))
+                self._later(self._leave, str(error))
             else:
                 await self._run(job)
 
@@ -216,9 +216,10 @@ class Part(param.Parameterized):
                 self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
             raise
 
-    def _refuse(self, reason: str) -> None:
+    def _leave(self, line: str, bad: bool = True) -> None:
+        """Nothing computes the state as it is now: why."""
         self._fade(True)
-        self.say(reason)
+        self.say(line, bad=bad)
 
     def _begun(self) -> None:
         if self._waits:
@@ -248,7 +249,3 @@ class Part(param.Parameterized):
         with pn.io.hold(self._document):  # one message to the browser
             for change in changes:
                 change()
-
-
-def nothing() -> None:
-    """A document sends its changes by itself; a notebook is told to."""

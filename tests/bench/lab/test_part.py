@@ -21,8 +21,6 @@ from gradient_routes.bench.lab.pool import Pool
 from gradient_routes.bench.lab.shell import Command, Exited, Row, Said
 from gradient_routes.problems.errors import InputError
 
-from .aside import aside
-
 
 class Tried(Part):
     """One parameter of each kind."""
@@ -82,7 +80,7 @@ def settled(part: Tried, *states: dict[str, Any]) -> None:
         while part.running:
             await asyncio.sleep(0.01)
 
-    aside(move())
+    asyncio.run(move())
 
 
 def test_a_url_holds_the_state() -> None:
@@ -133,5 +131,5 @@ def test_what_runs_can_be_stopped() -> None:
         while part.running:
             await asyncio.sleep(0.01)
 
-    aside(move())
+    asyncio.run(move())
     assert "stopped" in part.said

@@ -20,15 +20,14 @@ from gradient_routes.bench.execution.isolation.channel import Call, Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message, Returned
 from gradient_routes.bench.lab.pool import Begun, Lane, Pool
 
-from .aside import Loop, aside
-
+Loop = asyncio.AbstractEventLoop
 LONG = 600.0  # [s] longer than any test
 PID, SLEEP, NOTHING = Call(os.getpid), Call(time.sleep, (LONG,)), Call(int)
 
 
 @pytest.fixture(scope="module")
 def loop() -> Iterator[Loop]:
-    made = Loop()
+    made = asyncio.new_event_loop()
     yield made
     made.close()
 
@@ -127,7 +126,7 @@ def test_messages_that_are_not_asked_for_any_more_end_the_job(one: Pool, loop: L
 def run(test: Coroutine[Any, Any, Any]) -> Any:
     """And see that nothing is left."""
     threads, processes = threading.active_count(), {*psutil.Process().children(recursive=True)}
-    found = aside(test)
+    found = asyncio.run(test)
     assert not {*psutil.Process().children(recursive=True)} - processes
     assert threading.active_count() == threads
     return found

@@ -125,9 +125,13 @@ def test_the_page_shows_the_rows_that_the_command_exports(
     expect(page).to_have_url(f"{laboratory}/store?route=adjoint&ended=ok")
 
 
-@pytest.mark.parametrize("section", ["bill", "vcurves"])
-def test_figures_are_drawn_on_the_page(page: Page, laboratory: str, section: str) -> None:
-    page.goto(f"{laboratory}/store?show=figures&section={section}")
+def test_the_section_that_is_asked_for_is_drawn(kept: Path) -> None:
+    found = [looking.drawn(Store(kept), Filter(), section).section for section in ("vcurves", "bill", "no such")]
+    assert found == ["vcurves", "bill", "bill"]
+
+
+def test_figures_are_drawn_on_the_page(page: Page, laboratory: str) -> None:
+    page.goto(f"{laboratory}/store?show=figures&section=vcurves")
     inside = page.frame_locator("iframe")
     inside.locator(".plot").first.scroll_into_view_if_needed()
     expect(inside.locator(".plot svg").first).to_be_visible()
