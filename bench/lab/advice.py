@@ -19,7 +19,7 @@ from gradient_routes.bench.advice.wording import plain
 from gradient_routes.bench.cases.row import as_json
 from gradient_routes.bench.execution.cost_model import LEGEND, summary
 from gradient_routes.bench.execution.isolation.channel import Channel
-from gradient_routes.bench.lab.drawing import colour
+from gradient_routes.bench.lab.drawing import swatch
 from gradient_routes.bench.lab.numbers import table
 from gradient_routes.bench.lab.shell import Row
 from gradient_routes.bench.render.format import ratio
@@ -67,7 +67,7 @@ def answer(advice: dict[str, Any]) -> str:
     bill = (
         f"{duration(best['seconds'])}, {ratio(best['forward_ratio'])} forward solves: {summary(Work(**best['work']))}"
     )
-    return f"<h2>{square(best['route'])} {html.escape(best['route'])}</h2><p>{bill}</p><ul>{reasons}</ul>"
+    return f"<h2>{swatch(best['route'])}</h2><p>{bill}</p><ul>{reasons}</ul>"
 
 
 def sources(keys: list[str]) -> str:
@@ -81,7 +81,7 @@ def bill_table(advice: dict[str, Any]) -> str:
     head = ["route", "error", "time", "cost / forward solve", "work", "holds"]
     rows = [
         (
-            f"{square(row['route'])} {html.escape(row['route'])}",
+            swatch(row["route"]),
             f"{row['error']:.1g}",
             duration(row["seconds"]),
             ratio(row["forward_ratio"]),
@@ -101,11 +101,6 @@ def bill_table(advice: dict[str, Any]) -> str:
             * bool(others)
         )
     )
-
-
-def square(selector: str) -> str:
-    """The colour of a route."""
-    return f'<span aria-hidden="true" style="color: {colour(selector.partition("[")[0])}">\u25a0</span>'
 
 
 def glossary() -> str:

@@ -130,8 +130,9 @@ class Part(param.Parameterized):
         What of its URL was not taken is said before them, until the state changes.
         """
         lines = (*self._refused, *lines)
-        kind = "bad" if bad and lines else "quiet"
-        self.status.object = f'<p role="status" class="{kind}">{"<br>".join(map(html.escape, lines))}</p>'
+        self.status.object = (
+            f'<p role="status" class="{"bad" if bad and lines else "quiet"}">{"<br>".join(map(html.escape, lines))}</p>'
+        )
 
     # the commands
 

@@ -124,9 +124,13 @@ def told(figure: Figure) -> str:
     return f"<details><summary>What is said of {len(items)} panels</summary><ul>{''.join(items)}</ul></details>"
 
 
+def kind_of(verdict: str) -> str:
+    """Its class: good, bad or unsure."""
+    return "good" if verdict == "agrees" else "bad" if verdict.startswith(("wrong", "incons")) else "unsure"
+
+
 def badge(word: str) -> str:
-    kind = "good" if word == "agrees" else "bad" if word.startswith(("wrong", "incons")) else "unsure"
-    return f"<span class='verdict {kind}'>{escape(word)}</span>" if word else ""
+    return f"<span class='verdict {kind_of(word)}'>{escape(word)}</span>" if word else ""
 
 
 def _note(note: Note) -> str:

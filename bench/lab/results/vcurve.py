@@ -11,6 +11,7 @@ from bokeh.models import ColumnDataSource, Range1d, Span
 
 from gradient_routes.bench.lab.drawing import INK, colour, marker, plot, span, swatch
 from gradient_routes.bench.lab.numbers import number, table
+from gradient_routes.bench.render.html import badge, kind_of
 
 QUOTIENTS = {"error_one_sided": ("one-sided", "fd-one-sided"), "error_central": ("central", "fd-central")}
 MARKS = {"good": "\u2713", "bad": "\u2717", "unsure": "?"}
@@ -76,12 +77,11 @@ class VCurve:
 def judged(check: dict[str, Any]) -> str:
     """The sentences of `routes vcurve`, word for word, with a colour and a mark."""
     verdict = check["verdict"]
-    kind = "good" if verdict == "agrees" else "bad" if verdict.startswith(("wrong", "incons")) else "unsure"
-    name, word, says, todo = (html.escape(check[key] or "") for key in ("name", "verdict", "says", "next"))
-    mark = f'<span aria-hidden="true">{MARKS[kind]}</span>'
+    name, says, todo = (html.escape(check[key] or "") for key in ("name", "says", "next"))
+    mark = f'<span aria-hidden="true">{MARKS[kind_of(verdict)]}</span>'
     return (
-        f'<div class="judged" role="status"><p>{mark} <span id="verdict">{name}: <span class="verdict {kind}">{word}'
-        f'</span></span></p><p id="says">{says}</p><p id="next">next: {todo}</p></div>'
+        f'<div class="judged" role="status"><p>{mark} <span id="verdict">{name}: {badge(verdict)}'
+        f'</span></p><p id="says">{says}</p><p id="next">next: {todo}</p></div>'
     )
 
 
