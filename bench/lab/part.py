@@ -130,11 +130,8 @@ class Part(param.Parameterized):
         What of its URL was not taken is said before them, until the state changes.
         """
         lines = (*self._refused, *lines)
-        self.status.object = (
-            f'<p role="status" class="{"bad" if bad and lines else "quiet"}">{"<br>".join(map(html.escape, lines))}</p>'
-        )
-
-    # the commands
+        kind = "bad" if bad and lines else "quiet"
+        self.status.object = f'<p role="status" class="{kind}">{"<br>".join(map(html.escape, lines))}</p>'
 
     def _changed(self, *_: Any) -> None:
         self._refused = []
