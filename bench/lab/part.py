@@ -57,6 +57,9 @@ class Part(param.Parameterized):
     slug: ClassVar[str]
     title: ClassVar[str]
     lead: ClassVar[str]
+    each: ClassVar[Mapping[str, tuple[float, float]]] = {}  # list -> bounds of its items
+
+    drawn: tuple[pn.viewable.Viewable, ...] = ()  # what shows results; it fades while they are those of another state
 
     def __init__(self, place: Place, query: Mapping[str, str] | None = None) -> None:
         super().__init__()
@@ -65,7 +68,7 @@ class Part(param.Parameterized):
         self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
-        self._moves, self._waits, self.pushed = 0, False, nothing
+        self._moves, self._waits, self._asked, self.pushed = 0, False, "", nothing
         self._changes: list[Callable[[], None]] = []
         self._following: asyncio.Task[None] | None = None
         self._refused = self._read(query or {})
@@ -98,6 +101,7 @@ class Part(param.Parameterized):
 
     def leave(self) -> None:
         """The state has changed and waits for `start`: what is drawn is that of another one."""
+        self.fade()
 
     def queue(self, before: int) -> None:
         """The job waits; so many are before it."""
@@ -112,6 +116,13 @@ class Part(param.Parameterized):
 
     def end(self, end: Ended, code: int) -> None:
         """The job has ended; its exit code."""
+        self.fade(end.status is not Status.OK or code == WRONG_USAGE)
+
+    def fade(self, stale: bool = True) -> None:
+        """Show that what is drawn is not of this state, or that it is, unless it was left while its command ran."""
+        stale = stale or (not self.at_once and self.query() != self._asked)
+        for panel in self.drawn:
+            panel.styles = {"opacity": "0.4" if stale else "1"}  # no styles would leave it as it is
 
     # the state
 
@@ -136,11 +147,18 @@ class Part(param.Parameterized):
         """Take the state of a URL; why parts of it are not taken."""
         refused = []
         for name, text in query.items():
-            if name in self.fields:
+            if name not in self.fields:
+                refused.append(f"{name[:40]}: no word of this page - choose from {', '.join(self.fields)}")
+            else:
                 try:
-                    setattr(self, name, read(self.param[name], text))
+                    value = read(self.param[name], text)
+                    if name in self.each:
+                        within(self.each[name], value)
+                    setattr(self, name, value)
                 except (ValueError, TypeError) as error:
-                    refused.append(f"{name}={text[:40]}: {error} - {name} stays {written(getattr(self, name))}")
+                    refused.append(
+                        f"{name}={text[:40]}: {str(error)[:160]} - {name} stays {written(getattr(self, name))}"
+                    )
         return refused
 
     def say(self, *lines: str, bad: bool = True) -> None:
@@ -198,11 +216,11 @@ class Part(param.Parameterized):
         """Run the command of the state until it is that of the newest one."""
         done = -1
         while done != self._moves:
-            done = self._moves
+            done, self._asked = self._moves, self.query()
             try:
                 job = self.job()
             except InputError as error:
-                self._later(self.say, str(error))
+                self._later(self._refuse, str(error))
             else:
                 await self._run(job)
 
@@ -227,6 +245,10 @@ class Part(param.Parameterized):
             if self._following is asyncio.current_task():  # else a newer one has begun
                 self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
             raise
+
+    def _refuse(self, why: str) -> None:
+        self.fade()
+        self.say(why)
 
     def _begun(self) -> None:
         if self._waits:
@@ -267,6 +289,13 @@ def written(value: Any) -> str:
     if isinstance(value, list):
         return ",".join(map(written, value)) or NONE
     return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def within(bounds: tuple[float, float], values: list[float]) -> None:
+    """Raises ValueError for items that are not within bounds."""
+    low, high = bounds
+    if odd := [x for x in values if not low <= x <= high]:
+        raise ValueError(f"{written(odd[0])[:20]} is not from {low:g} to {high:g}")
 
 
 def read(declared: param.Parameter, text: str) -> Any:

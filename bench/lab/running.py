@@ -20,7 +20,6 @@ class Running:
         self.stop = pn.widgets.Button(label="Stop", width=90, disabled=True, on_click=lambda _: part.stop())
         self.progress = pn.pane.HTML("", width=330)
         self._of, self._come = 0, 0
-        self._faded: tuple[pn.viewable.Viewable, ...] = ()
         self.follow()
 
     def panel(self) -> pn.FlexBox:
@@ -30,11 +29,8 @@ class Running:
         """The state has changed: where changes are computed at once, there is nothing to press."""
         self.run.visible = self.stop.visible = not self._part.at_once
 
-    def leave(self, *drawn: pn.viewable.Viewable) -> None:
-        """What is drawn is not of the state of the part any more: it fades until a new job begins."""
-        self._faded = drawn
-        for panel in drawn:
-            panel.styles = {"opacity": "0.4"}
+    def leave(self) -> None:
+        """What is drawn is not of the state of the part any more."""
         self._part.say("changed: press Run to compute it", bad=False)
 
     def waits(self) -> None:
@@ -44,8 +40,6 @@ class Running:
         """A job begins; `rows` are expected, 0: nobody knows."""
         self.stop.disabled = False
         self._of, self._come = rows, 0
-        for panel in self._faded:
-            panel.styles = {"opacity": "1"}  # no styles would leave it as it is
         self._show("running")
 
     def row(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import panel as pn
@@ -51,6 +51,7 @@ class Derivation(Part):
     slug, title = "derivation", "The discrete adjoint"
     lead = "Change a modulus or a sensor: every number beside every line follows."
 
+    each: ClassVar = {"octaves": (-OCTAVES, OCTAVES), "sensors": (1, N)}
     octaves = param.List([0.0] * N, item_type=float, bounds=(N, N), doc="log2 of E_e / E of the start")
     sensors = param.List([1, 3, 5], item_type=int, bounds=(0, N), doc="nodes")
 
@@ -87,6 +88,7 @@ class Derivation(Part):
         self._loads = ColumnDataSource({"x": x, "load": x})
         self._elements = ColumnDataSource({"e": [e + 1 for e in range(N)], "g": x})
         figures = {"adjoint": self._adjoint_bar(), "product": self._products()}
+        self.drawn = *self._live.values(), *figures.values()
         steps: list[pn.viewable.Viewable] = []
         for name, line in LINES.items():
             steps += [pn.pane.HTML(with_formulas(line), sizing_mode="stretch_width"), self._live[name]]

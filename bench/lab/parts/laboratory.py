@@ -7,6 +7,7 @@ from typing import Any, get_args
 import panel as pn
 import param
 
+from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.lab import chosen
 from gradient_routes.bench.lab.part import Part
@@ -115,6 +116,12 @@ class Laboratory(Part):
         loose = [] if self.rtol == RTOL else ["--rtol", self.rtol]
         return loose + ([] if self.linear_solver == "auto" else ["--linear-solver", self.linear_solver])
 
+    def job(self) -> Job:
+        """The mode may be another one when it begins."""
+        found = super().job()
+        self._next = self.mode
+        return found
+
     @property
     def expected(self) -> int:
         """Rows to come, where that is known."""
@@ -131,6 +138,7 @@ class Laboratory(Part):
             "gradient": Bill(), "vcurve": VCurve(), "kink": Kink(), "unrolling": Unrolling(),
         }  # fmt: skip
         self._panels = {name: result.panel() for name, result in self._results.items()}
+        self.drawn = tuple(self._panels.values())
         self._fresh, self._drawn, self._choosing = False, self.mode, False
         self._controls = self._widgets()
         self._running = Running(self)
@@ -206,11 +214,12 @@ class Laboratory(Part):
     # what comes
 
     def begin(self) -> None:
-        self._fresh, self._drawn = True, self.mode
+        self._fresh, self._drawn = True, self._next
         self._running.begin(self.expected)
 
     def leave(self) -> None:
-        self._running.leave(*self._panels.values())
+        super().leave()
+        self._running.leave()
 
     def queue(self, before: int) -> None:
         super().queue(before)
@@ -231,4 +240,5 @@ class Laboratory(Part):
         """What was drawn before goes when the first row comes."""
         if self._fresh:
             self._results[self._drawn].clear()
+            self.fade(False)
             self._fresh = False

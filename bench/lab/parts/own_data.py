@@ -67,15 +67,18 @@ class OwnData(Part):
         return ("invert", "--problem", of, *reading, *how, "-o", ESTIMATES)
 
     def job(self) -> Job:
-        """What an earlier command has written is not offered as that of this one."""
+        """What an earlier one has written is not offered as that of this one; the mode may change before it begins."""
+        found = super().job()
         self._estimates().unlink(missing_ok=True)
-        return super().job()
+        self._next = self.mode
+        return found
 
     # what is seen
 
     def content(self) -> pn.Column:
         self._results: dict[str, Result] = {"invert": Inversion(), "identify": Identified()}
         self._panels = {name: result.panel() for name, result in self._results.items()}
+        self.drawn = tuple(self._panels.values())
         self._running = Running(self)
         self._fresh, self._drawn = False, self.mode
         self._take_along = pn.widgets.FileDownload(
@@ -137,12 +140,13 @@ class OwnData(Part):
     # what comes
 
     def begin(self) -> None:
-        self._fresh, self._drawn = True, self.mode
+        self._fresh, self._drawn = True, self._next
         self._take_along.disabled = True
         self._running.begin()
 
     def leave(self) -> None:
-        self._running.leave(*self._panels.values())
+        super().leave()
+        self._running.leave()
 
     def queue(self, before: int) -> None:
         super().queue(before)
@@ -164,4 +168,5 @@ class OwnData(Part):
         """What was drawn before goes when the first row comes."""
         if self._fresh:
             self._results[self._drawn].clear()
+            self.fade(False)
             self._fresh = False

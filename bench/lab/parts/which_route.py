@@ -8,14 +8,14 @@ from typing import Any
 
 import panel as pn
 import param
-from bokeh.models import ColumnDataSource
+from bokeh.models import ColumnDataSource, Range1d
 
 from gradient_routes.bench.advice.asked import answers_of
 from gradient_routes.bench.advice.statements import OF_ROUTES
 from gradient_routes.bench.execution.isolation.limits import LEAST
 from gradient_routes.bench.execution.isolation.messages import Message
 from gradient_routes.bench.lab.advice import Advise, Curves, answer, bill_table, glossary
-from gradient_routes.bench.lab.drawing import INK, colour, plot
+from gradient_routes.bench.lab.drawing import INK, colour, plot, span
 from gradient_routes.bench.lab.numbers import table
 from gradient_routes.bench.lab.part import Part, written
 from gradient_routes.bench.lab.shell import Row
@@ -77,7 +77,11 @@ class WhichRoute(Part):
         )
         self._curves = ColumnDataSource({name: [] for name in ("n_p", *OF_ROUTES)})
         self._here = ColumnDataSource({"x": [], "y": []})
-        drawn = plot("parameters n_p", "time of all gradients [s]", x_axis_type="log", y_axis_type="log")
+        drawn = plot(
+            "parameters n_p", "time of all gradients [s]", x_axis_type="log", y_axis_type="log",
+            x_range=Range1d(0.5, 2e9), y_range=Range1d(0.1, 10.0),
+        )  # fmt: skip
+        self._times = drawn.y_range
         for name in OF_ROUTES:
             dash = "dashed" if name.endswith("-ad") else "solid"  # they often lie on the adjoint's
             look = {"color": colour(name), "line_width": 2, "line_dash": dash, "legend_label": name}
@@ -86,6 +90,7 @@ class WhichRoute(Part):
         drawn.legend.location = "top_left"
         words = pn.pane.HTML(glossary(), sizing_mode="stretch_width")
         figure = pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
+        self.drawn = self._answer, self._bills, figure, self._alternatives
         return pn.Column(
             self._controls(), self._answer, self._bills, figure, self._alternatives, words, sizing_mode="stretch_width"
         )
@@ -118,6 +123,7 @@ class WhichRoute(Part):
         none = [math.nan] * len(curves.n_p)
         self._curves.data = {"n_p": curves.n_p} | {name: curves.seconds.get(name, none) for name in OF_ROUTES}
         every = [s for line in curves.seconds.values() for s in line if math.isfinite(s)]
+        span(self._times, every, log=True)
         self._here.data = {"x": [self.parameters] * 2, "y": [min(every), max(every)] if every else [1.0, 1.0]}
 
     def _change_table(self, advice: dict[str, Any]) -> str:
