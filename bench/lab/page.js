@@ -6,3 +6,4 @@ document.addEventListener("click", event => {
     () => { button.textContent = "copied"; setTimeout(() => { button.textContent = said }, 1200) },
     () => { getSelection().selectAllChildren(button.parentNode.querySelector("code")) });
 });
+addEventListener("popstate", () => { if (!location.hash) location.reload() }); // back: the state of that address

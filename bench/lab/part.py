@@ -57,7 +57,7 @@ class Part(param.Parameterized):
     slug: ClassVar[str]
     title: ClassVar[str]
     lead: ClassVar[str]
-    each: ClassVar[Mapping[str, tuple[float, float]]] = {}  # list -> bounds of its items
+    each: ClassVar[Mapping[str, tuple[Any, ...]]] = {}  # list -> bounds of its items, or the words that it may have
 
     drawn: tuple[pn.viewable.Viewable, ...] = ()  # what shows results; it fades while they are those of another state
 
@@ -291,8 +291,12 @@ def written(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
-def within(bounds: tuple[float, float], values: list[float]) -> None:
-    """Raises ValueError for items that are not within bounds."""
+def within(bounds: tuple[Any, ...], values: list[Any]) -> None:
+    """Raises ValueError for items that are not within bounds, or no words of these."""
+    if isinstance(bounds[0], str):
+        if odd := [word for word in values if word not in bounds]:
+            raise ValueError(f"{odd[0][:20]} is none of {', '.join(bounds)}")
+        return
     low, high = bounds
     if odd := [x for x in values if not low <= x <= high]:
         raise ValueError(f"{written(odd[0])[:20]} is not from {low:g} to {high:g}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import panel as pn
 import param
@@ -37,6 +37,7 @@ class WhichRoute(Part):
     slug, title = "which-route", "Which route for me?"
     lead = "Answer what you know: the bill of every route, the one to take, why, and what would change the answer."
 
+    each: ClassVar = {"have": (*CAN.values(),)}
     have = param.List(["linearize"], item_type=str, label="What can you evaluate?")
     parameters = param.Integer(100, bounds=MANY, label="Parameters n_p")
     outputs = param.Integer(1, bounds=MANY, label="Outputs: 1, or m for d(S u)/dp")
@@ -87,7 +88,7 @@ class WhichRoute(Part):
             look = {"color": colour(name), "line_width": 2, "line_dash": dash, "legend_label": name}
             drawn.line("n_p", name, source=self._curves, **look)
         drawn.line("x", "y", source=self._here, color=INK, line_dash="dotted")
-        drawn.legend.location = "top_left"
+        drawn.legend.location, drawn.legend.ncols = "top_left", 3  # a phone has room for three
         words = pn.pane.HTML(glossary(), sizing_mode="stretch_width")
         figure = pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
         self.drawn = self._answer, self._bills, figure, self._alternatives
