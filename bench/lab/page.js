@@ -10,3 +10,4 @@ document.addEventListener("focusin", event => { // the handle of a slider has it
   const handle = event.composedPath()[0], title = handle.getRootNode().querySelector?.(".bk-slider-title");
   if (title && handle.getAttribute("role") === "slider") handle.setAttribute("aria-label", title.textContent.split(":")[0]);
 });
+addEventListener("popstate", () => { if (!location.hash) location.reload() }); // back: the state of that address

@@ -21,10 +21,11 @@ from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.lab.place import Place
 from gradient_routes.bench.lab.pool import Begun, Pool
 from gradient_routes.bench.lab.shell import Command, Exited, Said
-from gradient_routes.bench.lab.state import read, written
+from gradient_routes.bench.lab.state import read, within, written
 from gradient_routes.problems.errors import InputError
 
 WRONG_USAGE = 2
+SLOW = 0.5  # [s] after which what is drawn fades until its command says something
 TOGETHER = 10  # [ms] in which changes are gathered: every message to a browser has its price
 
 
@@ -39,6 +40,7 @@ class Part(param.Parameterized):
     slug: ClassVar[str]
     title: ClassVar[str]
     lead: ClassVar[str]
+    each: ClassVar[Mapping[str, tuple[Any, ...]]] = {}  # list -> bounds of its items, or the words that it may have
 
     def __init__(self, place: Place, query: Mapping[str, str] | None = None) -> None:
         super().__init__()
@@ -47,7 +49,7 @@ class Part(param.Parameterized):
         self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
-        self._moves, self._waits = 0, False
+        self._moves, self._waits, self._asked = 0, False, ""
         self.pushed: Callable[[], None] = lambda: None  # a document sends its changes by itself, a notebook is told to
         self.drawn: tuple[pn.viewable.Viewable, ...] = ()
         self._changes: list[Callable[[], None]] = []
@@ -117,11 +119,18 @@ class Part(param.Parameterized):
         """Take the state of a URL; why parts of it are not taken."""
         refused = []
         for name, text in query.items():
-            if name in self.fields:
+            if name not in self.fields:
+                refused.append(f"{name[:40]}: no word of this page - choose from {', '.join(self.fields)}")
+            else:
                 try:
-                    setattr(self, name, read(self.param[name], text))
+                    value = read(self.param[name], text)
+                    if name in self.each:
+                        within(self.each[name], value)
+                    setattr(self, name, value)
                 except (ValueError, TypeError) as error:
-                    refused.append(f"{name}={text[:40]}: {error} - {name} stays {written(getattr(self, name))}")
+                    refused.append(
+                        f"{name}={text[:40]}: {str(error)[:160]} - {name} stays {written(getattr(self, name))}"
+                    )
         return refused
 
     def say(self, *lines: str, bad: bool = True) -> None:
@@ -143,7 +152,8 @@ class Part(param.Parameterized):
             self._leave(refused or "changed: press Run to compute it", bad=bool(refused))
 
     def _fade(self, faded: bool) -> None:
-        """What is drawn is that of another state, or of this one again."""
+        """What is drawn is that of another state, or of this one again, unless it was left while its command ran."""
+        faded = faded or (not self.at_once and self.query() != self._asked)
         for panel in self.drawn:
             panel.styles = {"opacity": "0.4" if faded else "1"}  # no styles would leave it as it is
 
@@ -184,7 +194,7 @@ class Part(param.Parameterized):
         """Run the command of the state until it is that of the newest one."""
         done = -1
         while done != self._moves:
-            done = self._moves
+            done, self._asked = self._moves, self.query()
             try:
                 job = self.job()
             except InputError as error:
@@ -195,6 +205,7 @@ class Part(param.Parameterized):
     async def _run(self, job: Job) -> None:
         said: list[str] = []
         code = 0
+        slow = asyncio.get_running_loop().call_later(SLOW, self._later, self._fade, True)
         try:
             async with aclosing(self.pool().messages(job, partial(self._later, self.queue))) as messages:
                 async for message in messages:
@@ -208,11 +219,14 @@ class Part(param.Parameterized):
                         case Ended():
                             self._later(self._ended, message, code, said)
                         case _:
-                            self._later(self.take, message)
+                            slow.cancel()
+                            self._later(self._take, message)
         except asyncio.CancelledError:
             if self._following is asyncio.current_task():  # else a newer one has begun
                 self._later(self._ended, Ended(Status.INTERRUPTED, "stopped"), code, said)
             raise
+        finally:
+            slow.cancel()
 
     def _leave(self, line: str, bad: bool = True) -> None:
         """Nothing computes the state as it is now: why."""
@@ -223,13 +237,16 @@ class Part(param.Parameterized):
         if self._waits:
             self._waits = False
             self.say()
-        self._fade(False)
         self.begin()
+
+    def _take(self, message: Message) -> None:
+        self._fade(False)
+        self.take(message)
 
     def _ended(self, end: Ended, code: int, said: list[str]) -> None:
         failed = end.status is not Status.OK
         self.say(*said, *([end.line(self.slug)] if failed else []), bad=failed or code == WRONG_USAGE)
-        self._fade(failed)
+        self._fade(failed or code == WRONG_USAGE)
         self.end(end, code)
 
     def _later(self, change: Callable[..., None], *arguments: Any) -> None:

@@ -13,6 +13,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import cast
+from urllib.parse import parse_qsl
 
 import panel as pn
 from bokeh.server.server import Server
@@ -54,8 +55,9 @@ class Laboratory:
     def session(self, slug: str) -> pn.Template:
         """A new session: one page with its part, as its URL says."""
         folder = Path(mkdtemp(dir=self.root))
-        query = pn.state.location.query_params if pn.state.location is not None else {}
-        part = load(slug)(Place(*self.pools, folder, self.store), {name: str(value) for name, value in query.items()})
+        search = pn.state.location.search if pn.state.location is not None else ""
+        query = dict(parse_qsl(search.removeprefix("?"), keep_blank_values=True))  # Panel would read 1.50 as a number
+        part = load(slug)(Place(*self.pools, folder, self.store), query)
 
         def end(_: object) -> None:
             part.stop()

@@ -18,6 +18,17 @@ def written(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
+def within(bounds: tuple[Any, ...], values: list[Any]) -> None:
+    """Raises ValueError for items that are not within two numbers, or no words of these."""
+    if isinstance(bounds[0], str):
+        if odd := [word for word in values if word not in bounds]:
+            raise ValueError(f"{odd[0][:20]} is none of {', '.join(bounds)}")
+        return
+    low, high = bounds
+    if odd := [x for x in values if not low <= x <= high]:
+        raise ValueError(f"{written(odd[0])[:20]} is not from {low:g} to {high:g}")
+
+
 def read(declared: param.Parameter, text: str) -> Any:
     """A value of a state from text. Raises ValueError; that it is within its bounds is for the parameter to say."""
     match declared:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import panel as pn
@@ -52,6 +52,7 @@ class Derivation(Part):
     slug, title = "derivation", "The discrete adjoint"
     lead = "Change a modulus or a sensor: every number beside every line follows."
 
+    each: ClassVar = {"octaves": (-OCTAVES, OCTAVES), "sensors": (1, N)}
     octaves = param.List([0.0] * N, item_type=float, bounds=(N, N), doc="log2 of E_e / E of the start")
     sensors = param.List([1, 3, 5], item_type=int, bounds=(0, N), doc="nodes")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import shlex
-from typing import get_args
+from typing import ClassVar, get_args
 
 import panel as pn
 import param
@@ -41,6 +41,7 @@ class Inverter(Part):
     slug, title = "inverter", "Adjoint bar inverter"
     lead = "Switch sensors, add noise, weigh Phi, step: what a gradient finds, what it costs, and what it cannot see."
 
+    each: ClassVar = {"sensors": (1, N)}
     sensors = param.List([1, 3, 5], item_type=int, bounds=(0, N), doc="nodes")
     noise = param.Number(1e-3, bounds=(0.0, 1.0), doc="standard deviation [m]")
     seed = param.Integer(0, bounds=(0, 10**6))
@@ -106,15 +107,16 @@ class Inverter(Part):
         drawn = [self.figures.bar, self.figures.moduli, *self.figures.strains]
         aligned = pn.Column(*(pn.pane.Bokeh(each, sizing_mode="stretch_width") for each in drawn))
         tradeoff = pn.pane.Bokeh(self.figures.tradeoff, sizing_mode="stretch_width")
+        cost = pn.pane.Bokeh(self.figures.cost, sizing_mode="stretch_width")
         self._redrawn = pn.Column(self._spread, tradeoff, sizing_mode="stretch_width", visible=False)
-        self.drawn = (self._meter, self._verdict, aligned, self._redrawn, self._numbers)
+        self.drawn = (self._meter, self._verdict, aligned, cost, self._redrawn, self._numbers)
         return pn.Column(
             self._controls(),
             self._meter,
             self._verdict,
             aligned,
             pn.pane.HTML(READ, sizing_mode="stretch_width"),
-            pn.pane.Bokeh(self.figures.cost, sizing_mode="stretch_width"),
+            cost,
             self._redrawn,
             self._numbers,
             sizing_mode="stretch_width",

@@ -7,6 +7,7 @@ from typing import Any, get_args
 import panel as pn
 import param
 
+from gradient_routes.bench.execution.isolation.channel import Job
 from gradient_routes.bench.execution.isolation.messages import Ended, Message
 from gradient_routes.bench.lab import chosen
 from gradient_routes.bench.lab.part import Part
@@ -116,6 +117,12 @@ class Laboratory(Part):
         loose = [] if self.rtol == RTOL else ["--rtol", self.rtol]
         return loose + ([] if self.linear_solver == "auto" else ["--linear-solver", self.linear_solver])
 
+    def job(self) -> Job:
+        """The mode may be another one when it begins."""
+        found = super().job()
+        self._next = self.mode
+        return found
+
     @property
     def expected(self) -> int:
         """Rows to come, where that is known."""
@@ -204,7 +211,7 @@ class Laboratory(Part):
     # what comes
 
     def begin(self) -> None:
-        self._running.begin(self.mode, self.expected)
+        self._running.begin(self._next, self.expected)
 
     def queue(self, before: int) -> None:
         super().queue(before)

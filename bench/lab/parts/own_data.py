@@ -66,9 +66,11 @@ class OwnData(Part):
         return ("invert", "--problem", of, *reading, *how, "-o", ESTIMATES)
 
     def job(self) -> Job:
-        """What an earlier command has written is not offered as that of this one."""
+        """What an earlier one has written is not offered as that of this one; the mode may change before it begins."""
+        found = super().job()
         self._estimates().unlink(missing_ok=True)
-        return super().job()
+        self._next = self.mode
+        return found
 
     # what is seen
 
@@ -134,7 +136,7 @@ class OwnData(Part):
 
     def begin(self) -> None:
         self._take_along.disabled = True
-        self._running.begin(self.mode)
+        self._running.begin(self._next)
 
     def queue(self, before: int) -> None:
         super().queue(before)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import html
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import panel as pn
 import param
-from bokeh.models import ColumnDataSource
+from bokeh.models import ColumnDataSource, Range1d
 
 from gradient_routes.bench.advice.asked import answers_of
 from gradient_routes.bench.advice.statements import OF_ROUTES
 from gradient_routes.bench.execution.isolation.limits import LEAST
 from gradient_routes.bench.execution.isolation.messages import Message
 from gradient_routes.bench.lab.advice import Advise, Curves, answer, bill_table, glossary
-from gradient_routes.bench.lab.drawing import INK, colour, plot
+from gradient_routes.bench.lab.drawing import INK, colour, plot, span
 from gradient_routes.bench.lab.numbers import table
 from gradient_routes.bench.lab.part import Part
 from gradient_routes.bench.lab.shell import Row
@@ -38,6 +38,7 @@ class WhichRoute(Part):
     slug, title = "which-route", "Which route for me?"
     lead = "Answer what you know: the bill of every route, the one to take, why, and what would change the answer."
 
+    each: ClassVar = {"have": (*CAN.values(),)}
     have = param.List(["linearize"], item_type=str, label="What can you evaluate?")
     parameters = param.Integer(100, bounds=MANY, label="Parameters n_p")
     outputs = param.Integer(1, bounds=MANY, label="Outputs: 1, or m for d(S u)/dp")
@@ -78,16 +79,20 @@ class WhichRoute(Part):
         )
         self._curves = ColumnDataSource({name: [] for name in ("n_p", *OF_ROUTES)})
         self._here = ColumnDataSource({"x": [], "y": []})
-        drawn = plot("parameters n_p", "time of all gradients [s]", x_axis_type="log", y_axis_type="log")
+        drawn = plot(
+            "parameters n_p", "time of all gradients [s]", x_axis_type="log", y_axis_type="log",
+            x_range=Range1d(0.5, 2e9), y_range=Range1d(0.1, 10.0),
+        )  # fmt: skip
+        self._times = drawn.y_range
         for name in OF_ROUTES:
             dash = "dashed" if name.endswith("-ad") else "solid"  # they often lie on the adjoint's
             look = {"color": colour(name), "line_width": 2, "line_dash": dash, "legend_label": name}
             drawn.line("n_p", name, source=self._curves, **look)
         drawn.line("x", "y", source=self._here, color=INK, line_dash="dotted")
         drawn.legend.location = "top_left"
-        self.drawn = (self._answer, self._bills, self._alternatives)
         words = pn.pane.HTML(glossary(), sizing_mode="stretch_width")
         figure = pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
+        self.drawn = self._answer, self._bills, figure, self._alternatives
         return pn.Column(
             self._controls(), self._answer, self._bills, figure, self._alternatives, words, sizing_mode="stretch_width"
         )
@@ -120,6 +125,7 @@ class WhichRoute(Part):
         none = [math.nan] * len(curves.n_p)
         self._curves.data = {"n_p": curves.n_p} | {name: curves.seconds.get(name, none) for name in OF_ROUTES}
         every = [s for line in curves.seconds.values() for s in line if math.isfinite(s)]
+        span(self._times, every, log=True)
         self._here.data = {"x": [self.parameters] * 2, "y": [min(every), max(every)] if every else [1.0, 1.0]}
 
     def _change_table(self, advice: dict[str, Any]) -> str:

@@ -150,3 +150,12 @@ def test_noise_is_redrawn_until_something_changes(page: Page, laboratory: str, c
     expect(page.get_by_role("heading", name=f"The same with {DRAWS} draws")).to_be_visible()
     page.get_by_role("button", name="reset").click()
     agrees(page, cli, "--iterations 0")
+
+
+def test_back_shows_the_state_of_the_address(page: Page, laboratory: str) -> None:
+    page.goto(f"{laboratory}/inverter?sensors=2")
+    page.get_by_role("button", name="7", exact=True).click()
+    expect(page.locator("code").last).to_contain_text("sensors=2,7")
+    page.wait_for_url("**/inverter?sensors=2,7")
+    page.go_back()
+    expect(page.locator("code").last).to_contain_text("bar[sensors=2,noise")

@@ -6,7 +6,7 @@ import asyncio
 import shlex
 from collections.abc import AsyncGenerator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 from urllib.parse import parse_qsl
 
 import panel as pn
@@ -30,6 +30,7 @@ class Tried(Part):
     n = param.Integer(8, bounds=(1, 100))
     noise = param.Number(0.0, bounds=(0.0, 1.0))
     nodes = param.List([1, 2], item_type=int)
+    each: ClassVar = {"nodes": (1, 8)}
     stop_at_tip = param.Boolean(False)
     route = param.Selector(default="adjoint", objects=["adjoint", "tangent"])
 
@@ -39,7 +40,8 @@ class Tried(Part):
         return ("run", "--problem", f"bar[n={self.n}]", "--route", self.route)
 
     def content(self) -> pn.Column:
-        return pn.Column()
+        self.drawn = (pn.Row(),)
+        return pn.Column(*self.drawn)
 
     def take(self, message: Any) -> None:
         self.__dict__.setdefault("taken", []).append(message)
@@ -94,7 +96,15 @@ def test_a_url_holds_the_state() -> None:
 
 @pytest.mark.parametrize(
     "query",
-    [{"n": "many"}, {"n": "0"}, {"noise": "nan"}, {"nodes": "a,b"}, {"stop_at_tip": "1"}, {"route": "fd; rm"}],
+    [
+        {"n": "many"},
+        {"n": "0"},
+        {"noise": "nan"},
+        {"nodes": "a,b"},
+        {"nodes": "1,9"},
+        {"stop_at_tip": "1"},
+        {"route": "fd; rm"},
+    ],
     ids=lambda query: str(query),
 )
 def test_a_url_that_is_wrong_is_told_and_changes_nothing(query: dict[str, str]) -> None:
@@ -119,6 +129,22 @@ def test_a_state_without_a_command_says_why() -> None:
     settled(part, {"n": 99})
     assert not pools.asked
     assert "choose another" in part.said
+
+
+def test_a_word_that_a_page_lacks_is_told() -> None:
+    part, _ = made({"sensor": "1"})
+    assert "sensor: no word of this page" in part.said
+
+
+def test_what_is_drawn_of_another_state_fades() -> None:
+    part, _ = made()
+    (panel,) = part.content()
+    settled(part, {"n": 9})
+    assert panel.styles["opacity"] == "1"
+    settled(part, {"n": 99})
+    assert panel.styles["opacity"] == "0.4"
+    settled(part, {"n": 9})
+    assert panel.styles["opacity"] == "1"
 
 
 def test_what_runs_can_be_stopped() -> None:
