@@ -10,4 +10,10 @@ document.addEventListener("focusin", event => { // the handle of a slider has it
   const handle = event.composedPath()[0], title = handle.getRootNode().querySelector?.(".bk-slider-title");
   if (title && handle.getAttribute("role") === "slider") handle.setAttribute("aria-label", title.textContent.split(":")[0]);
 });
+let pushed = 0;
+const push = history.pushState.bind(history);
+history.pushState = (...entry) => { // a drag of a slider is one entry
+  performance.now() - pushed < 1000 ? history.replaceState(...entry) : push(...entry);
+  pushed = performance.now();
+};
 addEventListener("popstate", () => { if (!location.hash) location.reload() }); // back: the state of that address

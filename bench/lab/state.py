@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import param
@@ -37,13 +38,21 @@ def read(declared: param.Parameter, text: str) -> Any:
                 raise ValueError("is yes or no")
             return text == "yes"
         case param.Integer():
-            return int(text)
+            return _number(int, text)
         case param.Number():
-            return None if text == "None" else float(text)
+            return None if text == "None" else _number(float, text)
         case param.List():
-            kind = declared.item_type or str
-            return [kind(item) for item in text.split(",") if item] if text != NONE else []
+            return [_number(declared.item_type or str, item) for item in text.split(",") if item and text != NONE]
+        case param.Selector() if text not in declared.objects:
+            raise ValueError(f"is none of {', '.join(map(str, declared.objects))}")
     return text
+
+
+def _number(kind: Callable[[str], Any], text: str) -> Any:
+    try:
+        return kind(text)
+    except ValueError:
+        raise ValueError("is no whole number" if kind is int else "is no number") from None
 
 
 def option(name: str, value: str) -> tuple[str, ...]:

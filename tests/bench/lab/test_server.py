@@ -96,7 +96,7 @@ def test_a_page_is_read_before_scripts_are_loaded(laboratory: str) -> None:
     status, text = asked(laboratory, "/derivation")
     assert status == 200
     assert "<h1>The discrete adjoint</h1>" in text
-    assert text.count("<script defer src=") == text.count(" src=") == 4
+    assert text.count("<script defer src=") == text.count(" src=") >= 4
 
 
 def test_a_port_in_use_is_refused(cli: Callable[..., Ran], laboratory: str) -> None:
