@@ -25,7 +25,7 @@ from gradient_routes.bench.lab.state import read, within, written
 from gradient_routes.problems.errors import InputError
 
 WRONG_USAGE = 2
-SLOW = 0.5  # [s] after which what is drawn fades until its command says something
+SLOW = 1.0  # [s] after which what is drawn fades until its command says something
 TOGETHER = 10  # [ms] in which changes are gathered: every message to a browser has its price
 
 
@@ -49,7 +49,7 @@ class Part(param.Parameterized):
         self.shown = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["command"])
         self._defaults = {name: self.param[name].default for name in self.fields}
         self._document: Document | None = pn.state.curdoc
-        self._moves, self._waits, self._asked = 0, False, ""
+        self._moves, self._waits, self._faded, self._asked = 0, False, False, ""
         self.pushed: Callable[[], None] = lambda: None  # a document sends its changes by itself, a notebook is told to
         self.drawn: tuple[pn.viewable.Viewable, ...] = ()
         self._changes: list[Callable[[], None]] = []
@@ -154,8 +154,10 @@ class Part(param.Parameterized):
     def _fade(self, faded: bool) -> None:
         """What is drawn is that of another state, or of this one again, unless it was left while its command ran."""
         faded = faded or (not self.at_once and self.query() != self._asked)
-        for panel in self.drawn:
-            panel.styles = {"opacity": "0.4" if faded else "1"}  # no styles would leave it as it is
+        if faded != self._faded:
+            self._faded = faded
+            for panel in self.drawn:
+                panel.styles = {"opacity": "0.4" if faded else "1"}  # no styles would leave it as it is
 
     def _show(self) -> str:
         """The command and the URL of the state; why there is no command."""
@@ -206,8 +208,9 @@ class Part(param.Parameterized):
         said: list[str] = []
         code = 0
         slow = asyncio.get_running_loop().call_later(SLOW, self._later, self._fade, True)
+        told = (lambda before: None) if self.at_once else partial(self._later, self.queue)
         try:
-            async with aclosing(self.pool().messages(job, partial(self._later, self.queue))) as messages:
+            async with aclosing(self.pool().messages(job, told)) as messages:
                 async for message in messages:
                     match message:
                         case Begun():

@@ -85,8 +85,9 @@ class Derivation(Part):
         for name, line in LINES.items():
             steps += [pn.pane.HTML(with_formulas(line), sizing_mode="stretch_width"), self._live[name]]
             steps += [figures[name]] if name in figures else []
-        self.drawn = (*self._live.values(), *figures.values())
-        return pn.Column(self._controls(), *steps, sizing_mode="stretch_width")
+        derived = pn.Column(*steps, sizing_mode="stretch_width")
+        self.drawn = (derived,)
+        return pn.Column(self._controls(), derived, sizing_mode="stretch_width")
 
     def _controls(self) -> pn.Column:
         sliders = [

@@ -109,9 +109,7 @@ class Inverter(Part):
         tradeoff = pn.pane.Bokeh(self.figures.tradeoff, sizing_mode="stretch_width")
         cost = pn.pane.Bokeh(self.figures.cost, sizing_mode="stretch_width")
         self._redrawn = pn.Column(self._spread, tradeoff, sizing_mode="stretch_width", visible=False)
-        self.drawn = (self._meter, self._verdict, aligned, cost, self._redrawn, self._numbers)
-        return pn.Column(
-            self._controls(),
+        found = pn.Column(
             self._meter,
             self._verdict,
             aligned,
@@ -121,6 +119,8 @@ class Inverter(Part):
             self._numbers,
             sizing_mode="stretch_width",
         )
+        self.drawn = (found,)
+        return pn.Column(self._controls(), found, sizing_mode="stretch_width")
 
     def _controls(self) -> pn.Column:
         params = self.param

@@ -92,10 +92,9 @@ class WhichRoute(Part):
         drawn.legend.location = "top_left"
         words = pn.pane.HTML(glossary(), sizing_mode="stretch_width")
         figure = pn.pane.Bokeh(drawn, sizing_mode="stretch_width")
-        self.drawn = self._answer, self._bills, figure, self._alternatives
-        return pn.Column(
-            self._controls(), self._answer, self._bills, figure, self._alternatives, words, sizing_mode="stretch_width"
-        )
+        advice = pn.Column(self._answer, self._bills, figure, self._alternatives, sizing_mode="stretch_width")
+        self.drawn = (advice,)
+        return pn.Column(self._controls(), advice, words, sizing_mode="stretch_width")
 
     def _controls(self) -> pn.Column:
         can = pn.widgets.CheckBoxGroup.from_param(self.param.have, name="", options=CAN, inline=False)
