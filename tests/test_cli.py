@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import select
+import shlex
 import shutil
 import signal
 import subprocess
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import ROOT, shell, with_routes
+from forks import Forks
 
 from gradient_routes.bench.cases.row import COLUMNS
 from gradient_routes.bench.cases.samples import Elapsed
@@ -385,12 +387,12 @@ def test_the_first_commands_import_little(code: str, light: str) -> None:
     assert not {light, "numpy", "rich", "ctypes", "sqlite3", "hashlib", "email.parser"} & set(done.stdout.splitlines())
 
 
-def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
-    run = "routes run --no-isolate --min-time 0 --problem 'bar[n=1|2|3]' --route adjoint --route tangent"
-    done = shell(run, tmp_path)
-    assert "bar[n=3]" in done.stdout
-    assert "\x1b" not in done.stdout + done.stderr
-    cut = shell(f"{run} --json | head -1", tmp_path)
+def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(forks: Forks, tmp_path: Path) -> None:
+    run = "run --no-isolate --min-time 0 --problem 'bar[n=1|2|3]' --route adjoint --route tangent"
+    done = forks.run(tmp_path, *shlex.split(run))
+    assert "bar[n=3]" in done.out
+    assert "\x1b" not in done.out + done.err
+    cut = shell(f"routes {run} --json | head -1", tmp_path)
     assert "Traceback" not in cut.stderr
 
 
