@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from commands import FAULTY, MARK, PATIENCE, Shell, ended, eventually, faulty, sigint_ignored, words
+from forks import Forks
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cases.case import ProblemSpec, RouteSpec
@@ -346,9 +347,9 @@ def test_a_gradient_of_many_components_comes_through(cli, tmp_path: Path) -> Non
         assert sum(1 for _ in file) == n + 1
 
 
-def test_what_c_prints_is_no_result_without_processes_either(started: Shell) -> None:
+def test_what_c_prints_is_no_result_without_processes_either(forks: Forks, tmp_path: Path) -> None:
     chosen = ("--problem", faulty(does="garbage", when="0|1"), "--problem", "bar", "--route", "fd-central")
-    ran = started.run("run", "--json", "--no-isolate", "--min-time", "0", "--no-store", *chosen)
+    ran = forks.run(tmp_path, "run", "--json", "--no-isolate", "--min-time", "0", "--no-store", *chosen)
     assert [row["status"] for row in ran.rows] == ["ok"] * 3
 
 
