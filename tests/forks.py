@@ -16,12 +16,14 @@ NOBODY = 198  # a descriptor of every command: a pipe that nobody reads
 
 
 class Forks:
-    """One process, which has imported the package, and one forked from it for each command."""
+    """One process, which has imported the package and has found the plug-ins that its environment names, and one
+    forked from it for each command.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, **environment: str) -> None:
         command = [sys.executable, str(ROOT / "tests" / "data" / "forking.py")]
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-        self._parent = subprocess.Popen(command, **pipes)
+        self._parent = subprocess.Popen(command, env={**os.environ, **environment}, **pipes)
 
     def run(self, folder: Path, *words: str, stdout: str | None = "", **environment: str) -> Ran:
         """`routes WORDS` in the folder; its stdout is given back or goes to a file, None for a pipe nobody reads."""

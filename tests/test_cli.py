@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import select
+import shlex
 import shutil
 import signal
 import subprocess
@@ -15,7 +16,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import ROOT, Shell, ended, faulty, shell, with_routes
+from commands import ROOT, shell, with_routes
+from forks import Forks
 
 from gradient_routes.bench.cases.row import COLUMNS
 from gradient_routes.bench.cases.samples import Elapsed
@@ -147,15 +149,17 @@ def test_points_to_differentiate_at(cli, tmp_path: Path) -> None:
     np.testing.assert_allclose(halfway["gradient"], bar.reference(np.full(8, 0.5)).gradient, rtol=1e-12)
 
 
-def test_a_million_moduli_answer_in_seconds(cli) -> None:
-    rows = {row["route"]: row for row in run(cli, "--json", problem="bar[n=1000000]", route="all").rows}
+def test_many_moduli_answer_in_seconds(cli) -> None:
+    """The tutorial has a million of them."""
+    ran = run(cli, "--json", "--budget", "6", problem="bar[n=100000]", route="all")
+    rows = {row["route"]: row for row in ran.rows}
     done = {name for name, row in rows.items() if row["status"] == "ok"}
     assert done == {"adjoint", "implicit-ad"}
     for name in rows.keys() - done:
         assert rows[name]["status"] == "skipped"
         assert "predicted" in rows[name]["reason"]
         assert "--budget inf" in rows[name]["reason"]
-        assert rows[name]["predicted_s"] > 60
+        assert rows[name]["predicted_s"] > 6
     for name in done:
         assert rows[name]["gradient_error"] < 1e-12
 
@@ -383,22 +387,22 @@ def test_the_first_commands_import_little(code: str, light: str) -> None:
     assert not {light, "numpy", "rich", "ctypes", "sqlite3", "hashlib", "email.parser"} & set(done.stdout.splitlines())
 
 
-def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
-    run = "routes run --no-isolate --min-time 0 --problem 'bar[n=1|2|3]' --route adjoint --route tangent"
-    done = shell(run, tmp_path)
-    assert "bar[n=3]" in done.stdout
-    assert "\x1b" not in done.stdout + done.stderr
-    cut = shell(f"{run} --json | head -1", tmp_path)
+def test_piped_output_has_no_control_codes_and_a_closed_pipe_is_no_error(forks: Forks, tmp_path: Path) -> None:
+    run = "run --no-isolate --min-time 0 --problem 'bar[n=1|2|3]' --route adjoint --route tangent"
+    done = forks.run(tmp_path, *shlex.split(run))
+    assert "bar[n=3]" in done.out
+    assert "\x1b" not in done.out + done.err
+    cut = shell(f"routes {run} --json | head -1", tmp_path)
     assert "Traceback" not in cut.stderr
 
 
 @pytest.mark.parametrize(
     ("study", "table"), [("invert", "inversion"), ("tolerance --route adjoint --tightest 1e-3 --json", "tolerance")]
 )
-def test_a_study_whose_reader_leaves_is_kept(study: str, table: str, tmp_path: Path) -> None:
-    """`true` has gone before anything is printed."""
-    cut = shell(f"routes {study} --problem bar --no-isolate | true", tmp_path)
-    assert (cut.stdout, cut.stderr) == ("", "")
+def test_a_study_whose_reader_leaves_is_kept(study: str, table: str, forks: Forks, tmp_path: Path) -> None:
+    """It has gone before anything is printed."""
+    cut = forks.run(tmp_path, *study.split(), "--problem", "bar", "--no-isolate", stdout=None)
+    assert (cut.out, cut.err) == ("", "")
     assert len(Store(tmp_path / "results" / "routes.sqlite").records(table)) > 2
 
 
@@ -434,18 +438,3 @@ def test_a_row_that_is_being_kept_is_kept_whatever_interrupts(cli, monkeypatch: 
     ran = cli("run", "--problem", "bar[n=2|3]", "--route", "adjoint", "--min-time", "0", "--json")
     assert ran.code == 130
     assert len(ran.rows) == len(Store(Path("results/routes.sqlite")).rows()) == 1
-
-
-def test_an_interrupt_keeps_and_shows_what_was_measured(started: Shell) -> None:
-    problems = ("--problem", "bar", "--problem", faulty(does="sleep"))
-    process = started.start("run", *problems, "--route", "fd-central", "--route", "fd-one-sided", "--no-timing")
-    started.asleep()
-    process.send_signal(signal.SIGINT)
-    ran = ended(process)
-    assert ran.code == 130, ran.err
-    assert "Traceback" not in ran.err
-    assert ran.err.startswith("routes: interrupted")
-    assert "go on with: routes run" in ran.err
-    assert ran.err.endswith("--resume\n")
-    assert len(Store(started.folder / "results" / "routes.sqlite").rows()) == 2
-    assert (ran.out.count("fd-central"), ran.out.count("fd-one-sided")) == (1, 1)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import json
+import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from commands import ROOT, shell
+from commands import ROOT, Ran
+from forks import Forks
 
 FD = {"fd-one-sided": 1e-5, "fd-central": 1e-8, "fd-extrapolated": 1e-10}
+CHOSEN = ("--problem duffing --route all", "--problem bar --route fd-extrapolated --route adjoint")
 
 
 @pytest.fixture(scope="module")
@@ -32,28 +35,37 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return site
 
 
-def routes(site: Path, arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return shell(f"routes {arguments}", cwd, PYTHONPATH=str(site))
+@pytest.fixture(scope="module")
+def installed(site: Path) -> Iterator[Forks]:
+    forks = Forks(PYTHONPATH=str(site))
+    yield forks
+    forks.end()
 
 
-def test_plugins_are_listed_with_their_origin_and_the_broken_with_the_reason(site: Path, tmp_path: Path) -> None:
-    done = routes(site, "list", tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "duffing  (from gradient-routes-duffing)" in done.stdout
-    assert "fd-extrapolated  (from gradient-routes-duffing)" in done.stdout
-    assert "'sunk' of broken cannot be imported: ModuleNotFoundError: No module named 'sunk'" in done.stdout
-    assert "'none' of broken is no Route" in done.stdout
-    assert "symmetry  (from gradient-routes-duffing)" in done.stdout
-    assert "study 'gone' of broken cannot be imported: ModuleNotFoundError: No module named 'gone'" in done.stdout
+@pytest.fixture
+def routes(installed: Forks, site: Path, tmp_path: Path) -> Callable[[str], Ran]:
+    """The command line where both are installed."""
+    return lambda words: installed.run(tmp_path, *shlex.split(words), PYTHONPATH=str(site))
 
 
-def test_plugins_run_beside_the_built_ins(site: Path, tmp_path: Path) -> None:
-    done = routes(site, "run --json --no-isolate --problem bar --problem duffing --route all --min-time 0", tmp_path)
-    assert done.returncode == 0, done.stderr
-    rows = {(r["problem"], r["route"]): r for r in map(json.loads, done.stdout.splitlines())}
-    assert len(rows) == 2 * 8
-    for (problem, route), row in rows.items():
-        if problem == "duffing" and route in ("unrolled-ad", "implicit-ad"):
+def test_plugins_are_listed_with_their_origin_and_the_broken_with_the_reason(routes: Callable[[str], Ran]) -> None:
+    done = routes("list")
+    assert done.code == 0, done.err
+    assert "duffing  (from gradient-routes-duffing)" in done.out
+    assert "fd-extrapolated  (from gradient-routes-duffing)" in done.out
+    assert "'sunk' of broken cannot be imported: ModuleNotFoundError: No module named 'sunk'" in done.out
+    assert "'none' of broken is no Route" in done.out
+    assert "symmetry  (from gradient-routes-duffing)" in done.out
+    assert "study 'gone' of broken cannot be imported: ModuleNotFoundError: No module named 'gone'" in done.out
+
+
+def test_plugins_run_beside_the_built_ins(routes: Callable[[str], Ran]) -> None:
+    done = [routes(f"run --json --no-isolate --min-time 0 {chosen}") for chosen in CHOSEN]
+    assert [ran.code for ran in done] == [0, 0], [ran.err for ran in done]
+    rows = {(r["problem"], r["route"]): r for ran in done for r in ran.rows}
+    assert len(rows) == 8 + 2
+    for (_, route), row in rows.items():
+        if route in ("unrolled-ad", "implicit-ad"):
             assert row["status"] == "skipped"
             assert "jax.numpy" in row["reason"]
             continue
@@ -65,26 +77,23 @@ def test_plugins_run_beside_the_built_ins(site: Path, tmp_path: Path) -> None:
     assert rows["duffing", "complex-step"]["reference"] == "tangent"
 
 
-def test_a_broken_plugin_is_one_line(site: Path, tmp_path: Path) -> None:
-    done = routes(site, "run --problem sunk --route adjoint", tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith("routes: problem 'sunk' of broken cannot be imported")
-    assert done.stderr.count("\n") == 1
+def test_a_broken_plugin_is_one_line(routes: Callable[[str], Ran]) -> None:
+    done = routes("run --problem sunk --route adjoint")
+    assert done.code == 2
+    assert done.err.startswith("routes: problem 'sunk' of broken cannot be imported")
+    assert done.err.count("\n") == 1
 
 
-def test_a_linear_solver_is_one_file_and_one_entry_point(site: Path, tmp_path: Path) -> None:
-    done = routes(
-        site,
-        "run --json --problem duffing --route adjoint --route complex-step --linear-solver dense-cholesky --min-time 0",
-        tmp_path,
-    )
-    assert done.returncode == 0, done.stderr
-    adjoint, complex_step = map(json.loads, done.stdout.splitlines())
+def test_a_linear_solver_is_one_file_and_one_entry_point(routes: Callable[[str], Ran]) -> None:
+    chosen = "--problem duffing --route adjoint --route complex-step --linear-solver dense-cholesky"
+    done = routes(f"run --json {chosen} --min-time 0 --no-isolate")
+    assert done.code == 0, done.err
+    adjoint, complex_step = done.rows
     assert adjoint["linear_solver"] == "LAPACK L L^T"
     assert adjoint["work"] == adjoint["predicted_work"]
     assert adjoint["gradient_error"] < 1e-12 > complex_step["gradient_error"]  # complex matrices: by LAPACK L U
     assert "auto|cg-amg|descent|krylov|pardiso|superlu|dense-cholesky|lost|number" in "".join(
-        routes(site, "run --linear-solver no-such", tmp_path).stderr.split()
+        routes("run --linear-solver no-such").err.split()
     ).replace("'", "").replace(",", "|")
 
 
@@ -95,31 +104,29 @@ def test_a_linear_solver_is_one_file_and_one_entry_point(site: Path, tmp_path: P
         ("number", "routes: linear solver 'number' of broken is no LinearSolver of that name - correct broken"),
     ],
 )
-def test_a_broken_linear_solver_is_one_line(site: Path, tmp_path: Path, solver: str, says: str) -> None:
-    done = routes(site, f"run --problem bar --route adjoint --linear-solver {solver}", tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith(says)
-    assert done.stderr.count("\n") == 1
+def test_a_broken_linear_solver_is_one_line(routes: Callable[[str], Ran], solver: str, says: str) -> None:
+    done = routes(f"run --problem bar --route adjoint --linear-solver {solver}")
+    assert done.code == 2
+    assert done.err.startswith(says)
+    assert done.err.count("\n") == 1
 
 
-def test_a_study_is_one_file_and_one_entry_point(site: Path, tmp_path: Path) -> None:
+def test_a_study_is_one_file_and_one_entry_point(routes: Callable[[str], Ran]) -> None:
     """Its command, its help, its rows in the store, in --json and in exports: no other file knows it."""
-    assert "symmetry" in routes(site, "--help", tmp_path).stdout
-    assert "so that a transposed solve is a plain one?" in " ".join(
-        routes(site, "symmetry --help", tmp_path).stdout.split()
-    )
-    done = routes(site, "symmetry --problem duffing --no-isolate", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("duffing: |R_u v - R_u^T v| / |R_u v| = 0\n")
-    done = routes(site, "symmetry --problem 'advection[n=4]' --json", tmp_path)
-    (row,) = map(json.loads, done.stdout.splitlines())
-    assert done.returncode == 1
+    assert "symmetry" in routes("--help").out
+    assert "so that a transposed solve is a plain one?" in " ".join(routes("symmetry --help").out.split())
+    done = routes("symmetry --problem duffing --no-isolate")
+    assert (done.code, done.err) == (0, "")
+    assert done.out.startswith("duffing: |R_u v - R_u^T v| / |R_u v| = 0\n")
+    done = routes("symmetry --problem 'advection[n=4]' --json")
+    (row,) = done.rows
+    assert done.code == 1
     assert row["table"] == "symmetry"
     assert row["asymmetry"] > 0.1
-    exported = routes(site, "export --table symmetry", tmp_path).stdout.splitlines()
+    exported = routes("export --table symmetry").out.splitlines()
     assert exported[0] == "study_id,problem,at,n_state,asymmetry"
     assert len(exported) == 3
-    assert routes(site, "symmetry", tmp_path).returncode == 2
+    assert routes("symmetry").code == 2
 
 
 def test_the_example_is_as_short_as_promised() -> None:

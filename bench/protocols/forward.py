@@ -49,7 +49,7 @@ def subject(F: Forward, at: Array | None, data: Array | None, seed: int) -> Subj
     """
     p = F.start if at is None else at
     if p is None:
-        raise InputError(f"{F.who}: has no start - give the point, {F.n_p} values, with --at")
+        raise InputError(f"{F.who}: has no start - give the point, {F.n_p} values, with --at FILE.csv")
     if len(p) != F.n_p:
         raise InputError(f"{F.who}: p has {len(p)} values, n_p = {F.n_p} - give {F.n_p}")
     size = _size(F, p)

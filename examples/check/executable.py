@@ -1,11 +1,10 @@
 """An external program: called with p on its standard input, it prints J and dJ/dp. Any language will do."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
 
-PROGRAM = [sys.executable, "-S", str(Path(__file__).parent / "executable_solver.py")]
+PROGRAM = [sys.executable, "-I", "-S", str(Path(__file__).parent / "executable_solver.py")]
 
 
 class External:
@@ -16,10 +15,10 @@ class External:
         self.tolerance = tolerance
 
     def value_and_gradient(self, p):
-        asked = json.dumps({"p": list(p), "tolerance": self.tolerance})
+        asked = " ".join(map(str, (*p, self.tolerance)))
         done = subprocess.run(PROGRAM, input=asked, capture_output=True, text=True, check=True)
-        answer = json.loads(done.stdout)
-        return answer["J"], answer["gradient"]
+        J, *gradient = map(float, done.stdout.split())
+        return J, gradient
 
     def tighten(self, factor):
         return External(self.tolerance * factor)

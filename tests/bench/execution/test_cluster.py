@@ -228,7 +228,8 @@ def test_a_killed_workers_case_is_done_by_another(lone: Site, folder: Path, laun
         assert "begun 2 times, workers were lost: tcp://127.0.0.1:" in slow["note"]
         resumed = cli(*command(*sweep, "--resume", address=lone.address))
         assert (resumed.code, resumed.rows) == (0, [])
-    here = cli("run", "--problem", "bar[n=4]", "--problem", "odd.py:Slow", "--route", "adjoint", *QUICK)
+    problems = ("--problem", "bar[n=4]", "--problem", "odd.py:Slow")
+    here = cli("run", *problems, "--route", "adjoint", "--no-timing", "--json")
     for key in ("case_key", "content_key", "objective", "gradient", "settings"):
         assert {str(row[key]) for row in rows} == {str(row[key]) for row in here.rows}
     assert rows[0].keys() == here.rows[0].keys()

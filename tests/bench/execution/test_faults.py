@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
+import shlex
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import shell, with_routes
+from commands import Ran, with_routes
 from forks import Forks
 
 EVIL = '''
@@ -84,17 +85,26 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return site
 
 
-def routes(site: Path, arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return shell(f"routes {arguments}", cwd, PYTHONPATH=str(site))
+@pytest.fixture(scope="module")
+def installed(site: Path) -> Iterator[Forks]:
+    forks = Forks(PYTHONPATH=str(site))
+    yield forks
+    forks.end()
 
 
-def test_foreign_routes_fail_alone(site: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def routes(installed: Forks, site: Path, tmp_path: Path) -> Callable[[str], Ran]:
+    """The command line where they are installed."""
+    return lambda words: installed.run(tmp_path, *shlex.split(words), PYTHONPATH=str(site))
+
+
+def test_foreign_routes_fail_alone(routes: Callable[[str], Ran]) -> None:
     chosen = " ".join(f"--route {name}" for name in [*ROUTES, "adjoint"])
-    done = routes(site, f"run --json --problem bar {chosen} --no-timing --no-isolate", tmp_path)
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    assert "garbage" in done.stderr, "what a plug-in prints is no result"
-    rows = {row["route"]: row for row in map(json.loads, done.stdout.splitlines())}
+    done = routes(f"run --json --problem bar {chosen} --no-timing --no-isolate")
+    assert done.code == 1
+    assert "Traceback" not in done.err
+    assert "garbage" in done.err, "what a plug-in prints is no result"
+    rows = {row["route"]: row for row in done.rows}
     assert [name for name, row in rows.items() if row["status"] == "ok"] == ["numpyish", "talks", "adjoint"]
     for name, says in {
         "mutates": "read-only",
@@ -109,23 +119,23 @@ def test_foreign_routes_fail_alone(site: Path, tmp_path: Path) -> None:
     assert rows["adjoint"]["gradient_error"] < 1e-15, "what a route did to p must not reach the next"
 
 
-def test_foreign_problems_fail_alone(site: Path, tmp_path: Path) -> None:
-    done = routes(site, "run --json --problem all --route fd-central --min-time 0", tmp_path)
-    assert done.returncode == 2, "a start outside the domain is wrong before anything runs"
-    assert "outside, start: p_1 = -1 is outside 0 < p_1" in done.stderr.replace("box, start", "outside, start")
+def test_foreign_problems_fail_alone(routes: Callable[[str], Ran]) -> None:
+    done = routes("run --json --problem all --route fd-central --min-time 0")
+    assert done.code == 2, "a start outside the domain is wrong before anything runs"
+    assert "outside, start: p_1 = -1 is outside 0 < p_1" in done.err.replace("box, start", "outside, start")
     chosen = " ".join(f"--problem {name}" for name in ("raises", "no_problem", "make", "bar"))
-    done = routes(site, f"run --json {chosen} --route fd-central --no-timing", tmp_path)
-    assert done.returncode == 1
-    rows = {row["problem"]: row for row in map(json.loads, done.stdout.splitlines())}
+    done = routes(f"run --json {chosen} --route fd-central --no-timing --no-isolate")
+    assert done.code == 1
+    rows = {row["problem"]: row for row in done.rows}
     assert "cannot be built: ValueError: not today" in rows["raises"]["reason"]
     assert "not a Problem" in rows["no_problem"]["reason"]
     assert rows["bar"]["n_param"] == 8, "a built-in is not to be replaced"
     assert rows["make"]["gradient"] == pytest.approx([6.0], rel=1e-8), "an integer start must not truncate steps"
 
 
-def test_the_list_shows_every_broken_entry(site: Path, tmp_path: Path) -> None:
-    done = routes(site, "list", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+def test_the_list_shows_every_broken_entry(routes: Callable[[str], Ran]) -> None:
+    done = routes("list")
+    assert (done.code, done.err) == (0, "")
     for says in (
         "exits' of evil cannot be imported: SystemExit: 3",
         "'pi' of evil cannot be called",
@@ -133,7 +143,7 @@ def test_the_list_shows_every_broken_entry(site: Path, tmp_path: Path) -> None:
         "hidden by the problem of the same name",
         "d=0.5",
     ):
-        assert says in done.stdout
+        assert says in done.out
 
 
 def test_huge_and_tiny_moduli_are_judged_or_refused(cli, tmp_path: Path) -> None:

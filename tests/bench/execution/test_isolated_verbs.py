@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from commands import FAULTY, MARK, Shell, ended, eventually, faulty, sigint_ignored
+from forks import Forks
 
 from gradient_routes.bench.cases.registry import studies
 from gradient_routes.bench.command_options import FINISHED
@@ -127,8 +128,8 @@ def test_no_code_of_others_ends_a_verb_as_if_all_were_well(cli, given: tuple[str
     assert "Traceback" not in ran.err
 
 
-def test_what_c_prints_is_no_result(started: Shell) -> None:
-    ran = started.run("check", "--json", "--no-store", f"{FAULTY}:Chatty")
+def test_what_c_prints_is_no_result(forks: Forks, tmp_path: Path) -> None:
+    ran = forks.run(tmp_path, "check", "--json", "--no-store", f"{FAULTY}:Chatty")
     assert ran.code == 0, ran.err
     assert "garbage of C" in ran.err
     assert json.loads(ran.out)["verdict"] == "agrees"

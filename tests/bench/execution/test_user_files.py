@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 import pytest
-from commands import Shell
+from forks import Forks
 
 from gradient_routes.bench.cases import case
 from gradient_routes.bench.cli import main
@@ -65,11 +65,11 @@ RUNNERS = ("run", "scaling")  # the others are confined as a whole
 
 
 def measuring() -> dict[str, tuple[str, ...]]:
-    """Every verb that takes a problem, but for the server, which is a process of its own; and how a file is named."""
+    """Every verb that measures a problem, in a process of its own if it is told to; and how a file is named."""
     found = {}
     for name, command in main.commands.items():
         options = {p.name for p in command.params if isinstance(p, click.Option)}
-        if {"selector", "problem", "problems"} & options and name != "serve":
+        if "isolate" in options:
             needed = [p for p in command.params if p.required and p.name == "routes"]
             found[name] = ("--route", "adjoint") if needed or name in ("check", "vcurve") else ()
     return found
@@ -124,14 +124,14 @@ def test_a_runner_imports_no_file(cli, tmp_path: Path, verb: str) -> None:
     assert not [name for name in {*sys.modules} - before if name.startswith("_routes_mine_")]
 
 
-def test_it_knows_what_has_been_done(cli, started: Shell, tmp_path: Path) -> None:
+def test_it_knows_what_has_been_done(cli, forks: Forks, tmp_path: Path) -> None:
     """Without importing: by what was said of the file, and by reading it."""
     (tmp_path / "mine.py").write_text(FILE)
     named = ("run", "--problem", "mine.py:Mine[n=2]", "--route", "mine.py:way", "--no-timing", "--json")
     counts = [len(cli(*named, "--resume", how).rows) for how in ("--isolate", "--isolate", "--no-isolate")]
     assert counts == [1, 0, 0], "keys are the same, wherever it is imported"
     (tmp_path / "mine.py").write_text(FILE + "\nMORE = 1\n")
-    assert len(started.run(*named, "--resume").rows) == 1
+    assert len(forks.run(tmp_path, *named, "--resume").rows) == 1
 
 
 @pytest.mark.parametrize(

@@ -78,8 +78,11 @@ def reading(folder: Path) -> list[list[str]]:
         files = [p for p in command.params if isinstance(p, click.Argument) and isinstance(p.type, click.Path)]
         named = ["results/routes.sqlite", "baseline.json"]
         words = [name, *named[: len(files)]]
-        if {"selector", "problem", "problems"} & {*options}:  # it measures
-            words += ["--problem", "bar", "--no-isolate"] + ["--route", "adjoint", "--no-timing"] * ("timed" in options)
+        if name == "lab":  # a server, which would not end here
+            continue
+        if {"selector", "isolate"} & {*options}:  # it measures
+            words += ["--problem", "bar", "--no-isolate"] + ["--no-timing"] * ("timed" in options)
+            words += ["--route", "adjoint"] * ("routes" in options)
             resumed += [[*words, "--resume"]] if "resume" in options else []
             continue
         assert "store" in options or files or name in ("list", "environments"), (

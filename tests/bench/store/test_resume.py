@@ -195,9 +195,9 @@ def test_two_runners_of_one_sweep_lose_no_row(plugin: Path) -> None:
     command = ["routes", "run", "--no-isolate", "--min-time", "0", "--json", "--resume", "--route", "fd-central"]
     command += ["--problem", "model.py:Model[n=1|2|3|4|5|6|7|8|9|10]"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    runners = [subprocess.Popen(command, cwd=plugin, env=with_routes(), **pipes) for _ in range(3)]
+    runners = [subprocess.Popen(command, cwd=plugin, env=with_routes(), **pipes) for _ in range(2)]
     printed = [Ran(runner.wait(), *out) for runner, out in [(r, r.communicate(timeout=PATIENCE)) for r in runners]]
-    assert [done.code for done in printed] == [0, 0, 0], [done.err for done in printed]
+    assert [done.code for done in printed] == [0, 0], [done.err for done in printed]
     rows = Store(plugin / "results" / "routes.sqlite").rows()
     every = [(row["case_key"], row["started"]) for done in printed for row in done.rows]
     assert Counter((row["case_key"], row["started"]) for row in rows) == Counter(every)
