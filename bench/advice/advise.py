@@ -20,10 +20,11 @@ from gradient_routes.bench.advice.statements import (
 )
 from gradient_routes.bench.execution.cost_model import summary
 from gradient_routes.bench.render.format import ratio
-from gradient_routes.bench.units import duration
+from gradient_routes.bench.units import duration, size
 from gradient_routes.routes.finite_difference import EPS
 
 ALIKE = 1.1  # prices that no prediction tells apart
+UNROLLED = 3.0  # of unrolled AD: its bill leaves out products with second derivatives, and JAX's own time for each
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,10 @@ def ranking(answers: Answers) -> list[Bill]:
     best = _first(ranked)
     if best is None or best.error > answers.error:
         return ranked
-    alike = [b for b in ranked if b.objection is None and b.error <= answers.error and b.seconds < ALIKE * best.seconds]
+    margin = UNROLLED if best.route.name == "unrolled-ad" else ALIKE
+    alike = [
+        b for b in ranked if b.objection is None and b.error <= answers.error and b.seconds < margin * best.seconds
+    ]
     best = min(alike, key=lambda bill: bill.memory)
     return [best, *(bill for bill in ranked if bill is not best)]
 
@@ -119,7 +123,9 @@ def _beside(answers: Answers, best: Bill, ranked: Sequence[Bill]) -> Iterator[St
     other = others[0]
     times = other.seconds / best.seconds
     equal = "costs about the same" if 1.0 / ALIKE < times < ALIKE else f"costs {ratio(times)} times as much"
-    yield Statement(f"{other.selector} {equal}: {summary(other.work)}", (), "explanation/costs.md")
+    keeps = f", and keeps {size(other.memory)}" if times < 1.0 < other.memory else ""
+    unpriced = ", without JAX's own time and products with second derivatives" if times < 1.0 / ALIKE else ""
+    yield Statement(f"{other.selector} {equal}: {summary(other.work)}{unpriced}{keeps}", (), "explanation/costs.md")
 
 
 def _too_wrong(answers: Answers, best: Bill, ranked: Sequence[Bill]) -> Iterator[Statement]:

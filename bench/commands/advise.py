@@ -15,6 +15,7 @@ from gradient_routes.bench.commands.group import FAILED
 from gradient_routes.bench.ranges import FRACTION, MANY, SECONDS, Real
 from gradient_routes.bench.sanitize import echo
 from gradient_routes.bench.studies.options import problem_option
+from gradient_routes.problems.errors import InputError, RoutesError
 
 if TYPE_CHECKING:
     from gradient_routes.bench.advice.answers import Answers
@@ -98,14 +99,28 @@ def advise(selector: str | None, at: str, rtol: float, as_json: bool, **given: A
 
 
 def of_problem(selector: str, at: str, rtol: float) -> Answers:
-    """What a problem at p tells of itself, by a few forward solves. Raises InputError, DomainError, NotConverged."""
+    """What a problem at p tells of itself. Raises InputError, and RoutesError where its process ends otherwise."""
+    from gradient_routes.bench.cases.status import Status
+    from gradient_routes.bench.execution.isolation.channel import Call
+    from gradient_routes.bench.execution.isolation.limits import Limits
+    from gradient_routes.bench.execution.isolation.messages import Returned
+    from gradient_routes.bench.execution.isolation.run import stream
+
+    *answers, end = stream(Call(measured_at, (selector, at, rtol)), Limits())
+    if answers and isinstance(answers[0], Returned):
+        found: Answers = answers[0].value
+        return found
+    raise (InputError if end.status is Status.REFUSED else RoutesError)(end.line("advise"))
+
+
+def measured_at(selector: str, at: str, rtol: float) -> Answers:
+    """The same in this process, by a few forward solves. Raises what the problem raises."""
     import numpy as np
 
     from gradient_routes.bench.advice.stand_in import measured
-    from gradient_routes.bench.cases.foreign_output import stdout_to_stderr
     from gradient_routes.bench.command_options import solver_of
     from gradient_routes.bench.studies.options import problem_at
 
     problem, p = problem_at(selector, at)
-    with stdout_to_stderr(), np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
         return measured(problem, p, solver_of(rtol))

@@ -140,7 +140,7 @@ def test_what_is_drawn_of_another_state_fades() -> None:
     part, _ = made()
     (panel,) = part.content()
     settled(part, {"n": 9})
-    assert panel.styles["opacity"] == "1"
+    assert panel.styles == {}
     settled(part, {"n": 99})
     assert panel.styles["opacity"] == "0.4"
     settled(part, {"n": 9})
