@@ -160,7 +160,7 @@ class Laboratory(Part):
             "mode": select(of.mode, label="What", options={words: name for name, words in MODES.items()}, width=210),
             "problem": select(of.problem, label="Problem", width=170),
             "options": pn.widgets.TextInput.from_param(
-                of.options, label="Further options of the problem", placeholder="n=16,stop=penalty", width=260
+                of.options, label="Further options of the problem", placeholder="n=16,alpha=1e-3", width=260
             ),
             "routes": self._own,
             "others": pn.Card(
