@@ -181,6 +181,7 @@ def _call(name: str, target: Callable[..., Any]) -> str:
     shown = [q.replace(annotation=q.empty) for q in given.parameters.values() if q.name != "self"]
     signature = str(given.replace(parameters=shown, return_annotation=given.empty))
     signature = re.sub(r"<function (\w+) at 0x\w+>", r"\1", signature)
+    signature = re.sub(r"<module '(\w+)' from [^>]+>", r"\1", signature)  # not where it is installed
     return textwrap.fill(f"{name}{signature}", 80, subsequent_indent=" " * 4, break_long_words=False)
 
 
