@@ -71,6 +71,6 @@ def _finite(at: str, text: str) -> float:
 
 def _number(text: str) -> float | None:
     try:
-        return float(text)
+        return float(text.replace("_", "?"))  # Python would read 1_0 as 10
     except ValueError:
         return None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gradient_routes.bench.command_options import debug_option, replaces, store_option
+from gradient_routes.bench.command_options import complain, debug_option, replaces, store_option
 from gradient_routes.bench.commands.filter_options import filter_options
 from gradient_routes.bench.sanitize import echo
 
@@ -68,8 +68,11 @@ def _print(store: Store, where: Filter) -> None:
     else:
         rows = [*numbered(store, thinned([*cases(store, LIGHT, parse=False)], MOST))]
     show(in_order(rows, lambda row: row))
+    if not rows and not where.empty:
+        complain("report: no case is as asked - name problems and routes without options; see routes status")
     if count > len(rows):
-        said = f"{len(rows)} of {count} rows are shown, those of evenly spaced problems; `routes export` writes all"
+        which = "those of evenly spaced problems" if where.empty else "the first"
+        said = f"{len(rows)} of {count} rows are shown, {which}; `routes export` writes all"
         console().print(said, style="dim", soft_wrap=True)
     if note := undeclared(rows):
         console().print(note, style="dim", soft_wrap=True)

@@ -50,7 +50,7 @@ def read(declared: param.Parameter, text: str) -> Any:
 
 def _number(kind: Callable[[str], Any], text: str) -> Any:
     try:
-        return kind(text)
+        return kind(text if kind is str else text.replace("_", "?"))  # Python would read 1_0 as 10
     except ValueError:
         raise ValueError("is no whole number" if kind is int else "is no number") from None
 

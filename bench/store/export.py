@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gradient_routes.bench.cases.suggest import did_you_mean
+from gradient_routes.bench.command_options import complain
 from gradient_routes.bench.sanitize import plain
 from gradient_routes.bench.store.filter import EVERYTHING, Filter
 from gradient_routes.bench.store.frames import frame
@@ -36,11 +37,23 @@ def export(store: Store, table: str, format: str, output: Path | None, where: Fi
     file = None if output is None else Output("export -o", output, SUFFIXES)
     if file is not None:
         file.check([store.path])
+    kept = 0
+
+    def counted(records: Iterator[tuple[Any, ...]]) -> Iterator[tuple[Any, ...]]:
+        nonlocal kept
+        for record in records:
+            kept += 1
+            yield record
+
     with filtered(store, table, where) as (names, records):
         if format == "parquet":
-            _write(file, iter([_parquet(table, names, [*records])]))
-            return
-        _write(file, (_json if format == "json" else _csv)(names, records))
+            _write(file, iter([_parquet(table, names, [*counted(records)])]))
+        else:
+            _write(file, (_json if format == "json" else _csv)(names, counted(records)))
+    if not kept and not where.empty:
+        complain(
+            f"export: no row of '{table}' is as asked - name problems and routes without options; see routes status"
+        )
 
 
 @contextmanager

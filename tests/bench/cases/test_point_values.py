@@ -33,6 +33,7 @@ def test_all_values_or_some_by_name() -> None:
         ("1,x,3", "no file, and 'x' no number"),
         ("1,,3", "no file, and '' no number"),
         ("", "no file, and '' no number"),
+        ("1_0,1,1", "no file, and '1_0' no number"),
         ("nan,1,1", "nan is not finite"),
         ("1,-inf,1", "-inf is not finite"),
         ("1,-2,3", "--at 1,-2,3: E_2 = -2 is outside 0 < E_2"),

@@ -98,6 +98,7 @@ def test_a_url_holds_the_state() -> None:
     "query",
     [
         {"n": "many"},
+        {"n": "1_0"},
         {"n": "0"},
         {"noise": "nan"},
         {"nodes": "a,b"},

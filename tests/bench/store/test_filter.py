@@ -51,6 +51,13 @@ def test_export_and_report_take_the_rows_that_hold_every_value(
     assert said.out == f"report of {len(found)} cases in r.md\n"
 
 
+@pytest.mark.parametrize("command", ["export", "report"])
+def test_that_nothing_is_as_asked_is_said(kept: Path, cli: Callable[..., Ran], command: str) -> None:
+    ran = cli(command, "--problem", "bar[n=16]", "--store", str(kept))
+    assert ran.code == 0
+    assert "is as asked - name problems and routes without options" in ran.err
+
+
 def test_variants_of_a_name_are_its_own(kept: Path) -> None:
     assert Filter(problem="bar").keeps({"problem": "bar[n=8], at true"})
     assert not Filter(problem="bar").keeps({"problem": "barrel"})
