@@ -19,7 +19,7 @@ def test_a_moved_modulus_and_a_sensor_move_every_number(page: Page, laboratory: 
     expect(page.get_by_role("slider", name="E_2")).to_be_focused()  # a name for screen readers
     page.keyboard.press("ArrowRight")
     expect(page.locator("code").last).to_contain_text("--at")
-    command = shlex.split(page.locator("code").last.inner_text())
+    command = shlex.split(page.locator("code").last.text_content() or "")
     row = cli(*command[1:], "--json", "--no-store").rows[-1]
     shown = page.get_by_role("table").last.locator("td:last-child")
     expect(shown).to_have_text([number(g, 6) for g in row["gradient"]])

@@ -96,14 +96,14 @@ def agrees(page: Page, cli: Cli, contains: str) -> list[dict[str, Any]]:
     """Rows of the command that is shown: it has these words, and table, meter and verdict are what it says."""
     shown = page.locator(".command code")
     expect(shown).to_contain_text(contains)
-    found = rows(cli, *shlex.split(shown.inner_text())[1:])
+    found = rows(cli, *shlex.split(shown.text_content() or "")[1:])
     last, estimates = found["inversion"][-1], found["estimates"]
     for column, name in ((2, "truth"), (3, "estimate"), (4, "gradient")):
         cells = page.get_by_role("table").locator(f"tbody tr :nth-child({column})")
         expect(cells).to_have_text([number(row[name]) for row in estimates])
     meter = [str(last["forward_solves"]), str(last["adjoint_solves"]), f"{last['ending_solves']} forward"]
     expect(page.locator("dd").nth(2)).to_have_text(meter[2])
-    assert page.locator("dd").all_inner_texts()[:4] == [*meter, str(last["iteration"])]
+    assert page.locator("dd").all_text_contents()[:4] == [*meter, str(last["iteration"])]
     expect(page.get_by_text(last["says"])).to_be_visible()
     return estimates
 
@@ -141,7 +141,7 @@ def test_noise_is_redrawn_until_something_changes(page: Page, laboratory: str, c
     page.goto(f"{laboratory}/inverter?iterations=1&noise=0.01&sensors=1&draws=2&alpha=1e-8")
     shown = page.locator(".command code")
     expect(shown).to_contain_text("--draws 2")
-    trade = rows(cli, *shlex.split(shown.inner_text())[1:])["tradeoff"][-1]
+    trade = rows(cli, *shlex.split(shown.text_content() or "")[1:])["tradeoff"][-1]
     for column, name in ((8, "mean"), (9, "sd")):
         cells = page.get_by_role("table").locator(f"tbody tr :nth-child({column})")
         expect(cells).to_have_text([number(v) for v in trade[name]])

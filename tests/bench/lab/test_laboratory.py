@@ -153,12 +153,12 @@ def test_nothing_is_drawn_across_a_kink() -> None:
 
 def rows_of(page: Page, cli: Callable[..., Ran]) -> list[dict[str, Any]]:
     """Those of the command that the page shows."""
-    command = shlex.split(page.locator("code").last.inner_text())
+    command = shlex.split(page.locator("code").last.text_content() or "")
     return cli(*command[1:], "--json", "--no-store").rows
 
 
 def cells(page: Page, column: int) -> list[str]:
-    return page.get_by_role("table").first.locator(f"tbody tr > :nth-child({column})").all_inner_texts()
+    return page.get_by_role("table").first.locator(f"tbody tr > :nth-child({column})").all_text_contents()
 
 
 def test_errors_and_work_of_routes_are_those_of_the_command(

@@ -94,7 +94,7 @@ def drop(page: Page, name: str, content: bytes) -> None:
 
 
 def shown(page: Page) -> list[str]:
-    return shlex.split(page.locator("code").last.inner_text())
+    return shlex.split(page.locator("code").last.text_content() or "")
 
 
 def test_the_example_is_estimated_and_taken_along(
@@ -152,7 +152,7 @@ def test_a_bad_file_is_one_line(page: Page, laboratory: str) -> None:
         expect(said.locator("br")).to_have_count(0)
     drop(page, "big.csv", bytes(6 * 2**20))
     expect(page.get_by_role("alert")).to_contain_text("Maximum file size is 5 MB")
-    assert "big.csv" not in page.locator("code").last.inner_text()
+    assert "big.csv" not in (page.locator("code").last.text_content() or "")
 
 
 def test_a_file_for_a_larger_problem_is_run_when_it_is_dropped(page: Page, laboratory: str) -> None:

@@ -118,7 +118,7 @@ def test_the_page_shows_the_rows_that_the_command_exports(
     for name, value in (("route", "adjoint"), ("status", "ok")):
         page.get_by_label(name, exact=True).select_option(f"{value} ({choices[name][value]})")
     expect(page.locator("code").last).to_contain_text("--status ok")
-    command = shlex.split(page.locator("code").last.inner_text())
+    command = shlex.split(page.locator("code").last.text_content() or "")
     rows = json.loads(cli(*command[1:], "--format", "json").out)
     expect(page.locator("td:first-child")).to_have_text([str(row["case_id"]) for row in rows])
     expect(page.get_by_text(f"Rows 1 to {len(rows)} of {len(rows)} of 240 rows.")).to_be_visible()

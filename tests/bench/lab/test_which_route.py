@@ -24,7 +24,7 @@ def test_answers_change_the_bills_and_what_would_change_them(
     outputs.fill("40")
     outputs.press("Enter")
     expect(page.locator("h2").first).to_contain_text("tangent")
-    command = shlex.split(page.locator("code").last.inner_text())
+    command = shlex.split(page.locator("code").last.text_content() or "")
     assert command == ["routes", "advise", "--parameters", "3", "--outputs", "40", "--forward", "20"]
     (advice,) = cli(*command[1:], "--json").rows
     possible = [row for row in advice["routes"] if row["possible"]]
